@@ -1,0 +1,59 @@
+/* Triangle meshes: Wavefront OBJ input, closedness, exact volume integrals, signed distance. */
+#ifndef SKIFF_MESH_H
+#define SKIFF_MESH_H
+
+#include "base/err.h"
+
+#include <stdint.h>
+
+/* Positions in metres, right-handed, y up; triangles counter-clockwise seen from outside. */
+typedef struct Mesh {
+    float (*vertices)[3];
+    uint32_t (*triangles)[3];
+    uint32_t vertex_count;
+    uint32_t triangle_count;
+    float min[3], max[3]; /* bounds of the referenced vertices */
+    struct MeshTree *tree; /* distance queries; built by mesh_build_tree */
+} Mesh;
+
+/* Mass properties of a uniform solid of density 1 kg/m^3, by exact polynomial integrals over the surface
+ * [Mirtich 1996, Fast and accurate computation of polyhedral mass properties]. */
+typedef struct MeshMass {
+    double volume;        /* m^3 */
+    double area;          /* m^2, of the surface */
+    double centre[3];     /* centre of mass, m */
+    double inertia[3][3]; /* about the centre, m^5; multiply by the density for kg m^2 */
+} MeshMass;
+
+/* Reads v and f records (triangles and polygons, which are fanned; negative indices; v/vt/vn forms); other records are ignored.
+ * ERR_INPUT with file:line on anything malformed: non-finite coordinates, index out of range, fewer than 3 corners. Vertices that
+ * coincide exactly are merged, so that meshes with split normals are still closed. */
+bool mesh_load_obj(const char *path, Mesh *mesh, Err *err);
+bool mesh_parse_obj(const char *name, const char *text, size_t size, Mesh *mesh, Err *err);
+/* Axis-aligned box, 8 vertices, 12 triangles. */
+bool mesh_make_box(const float min[3], const float max[3], Mesh *mesh, Err *err);
+/* Icosphere of 20 * 4^level triangles with vertices on the sphere. */
+bool mesh_make_sphere(const float centre[3], float radius, int level, Mesh *mesh, Err *err);
+/* Convex polyhedron: points p with (p - point_k) . normal_k <= 0 for all k planes. ERR_INPUT when empty or unbounded. */
+bool mesh_make_planes(const float (*points)[3], const float (*normals)[3], int count, Mesh *mesh, Err *err);
+void mesh_free(Mesh *mesh);
+
+/* True if every edge joins exactly two triangles of opposite orientation, no triangle is degenerate and the volume is positive.
+ * ERR_INPUT otherwise; the message names the mesh (`name`), the first faults with their vertices, and how many there are. A mesh turned
+ * inside out (negative volume) is an error that says so. */
+bool mesh_check_closed(const Mesh *mesh, const char *name, Err *err);
+
+/* Scales by `scale` per axis, then rotates by the unit quaternion (x, y, z, w), then translates. Rebuild the tree afterwards. A mirrored
+ * scale (negative determinant) flips the triangles so that they still face outside. */
+void mesh_transform(Mesh *mesh, const float scale[3], const float rotation[4], const float translation[3]);
+
+void mesh_mass(const Mesh *mesh, MeshMass *mass);
+
+bool mesh_build_tree(Mesh *mesh, Err *err);
+/* Signed distance in m, negative inside, exact for closed meshes (angle-weighted pseudo-normals, [Baerentzen & Aanaes 2005]).
+ * Needs the tree. closest may be NULL. */
+float mesh_distance(const Mesh *mesh, const float point[3], float closest[3]);
+/* Batch of the above. */
+void mesh_distances(const Mesh *mesh, const float (*points)[3], uint32_t count, float *distances);
+
+#endif

@@ -1,0 +1,10 @@
+/* Timed phases of a step, in the order they run. PHASE(id, key, label). Keys name columns of steps.csv and of summary.json. */
+PHASE(EMIT, "emit", "blocks of fluid emitted")
+PHASE(BODIES, "bodies", "body samples moved and sorted")
+PHASE(SORT, "sort", "cells and stable sort")
+PHASE(SEARCH, "search", "neighbour search, packed rows, density")
+PHASE(BOUNDARY, "boundary", "boundary terms and contacts")
+PHASE(DIVERGENCE, "divergence", "divergence solve")
+PHASE(FORCES, "forces", "gravity, viscosity, calming")
+PHASE(PRESSURE, "pressure", "density solve")
+PHASE(ADVANCE, "advance", "positions, body motion, checks")

@@ -1,0 +1,261 @@
+/* Skiff: particle water (SPH) around moving bodies. The engine's public interface: no GL, no stdout, no files but states.
+ *
+ * Units are SI, y is up. Arrays are owned by the simulation and valid until the next call that changes it. Functions that can fail
+ * take an `Err *` last, return false or NULL, and leave their object as it was unless they say otherwise. One simulation is used by one thread
+ * at a time; it runs its own OpenMP threads inside a call. Results do not depend on their number, bit for bit.
+ *
+ *   SkiffDef def = skiff_def_default();
+ *   ... fill in ...
+ *   SkiffSim *sim = skiff_create(&def, &err);
+ *   while (skiff_time(sim) < 10.0 && skiff_step(sim, &err)) { ... }
+ *   skiff_destroy(sim);
+ */
+#ifndef SKIFF_H
+#define SKIFF_H
+
+#include "base/err.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- Settings (params.inl is the one list of them) ---- */
+
+typedef struct SkiffParams {
+#define PARAM_FLOAT(field, key, value, min, max, unit, help) float field;
+#define PARAM_INT(field, key, value, min, max, unit, help) int field;
+#define PARAM_BOOL(field, key, value, help) bool field;
+#define PARAM_VEC3(field, key, x, y, z, min, max, unit, help) float field[3];
+#define PARAM_ENUM(field, key, value, names, help) int field;
+#include "params.inl"
+#undef PARAM_FLOAT
+#undef PARAM_INT
+#undef PARAM_BOOL
+#undef PARAM_VEC3
+#undef PARAM_ENUM
+} SkiffParams;
+
+typedef enum SkiffParamType { SKIFF_FLOAT, SKIFF_INT, SKIFF_BOOL, SKIFF_VEC3, SKIFF_ENUM } SkiffParamType;
+
+typedef struct SkiffParamInfo {
+    const char *key;      /* JSON key */
+    SkiffParamType type;
+    uint32_t offset;      /* of the field in SkiffParams */
+    double defaults[3];   /* [0] for scalars; enums: index */
+    double min, max;      /* inclusive; per component for vectors */
+    const char *unit;     /* "" where there is none */
+    const char *names;    /* enums: "a|b|c"; else NULL */
+    const char *help;
+} SkiffParamInfo;
+
+const SkiffParamInfo *skiff_param_infos(int *count);
+/* Every field in its range and finite; one line of message for each that is not. */
+bool skiff_params_check(const SkiffParams *params, Err *err);
+
+/* ---- What a simulation is made of. Strings and arrays are borrowed during skiff_create only. ---- */
+
+typedef enum SkiffGeometryKind { SKIFF_GEOMETRY_NONE, SKIFF_GEOMETRY_MESH, SKIFF_GEOMETRY_BOX, SKIFF_GEOMETRY_SPHERE, SKIFF_GEOMETRY_PLANES } SkiffGeometryKind;
+
+/* Own frame -> world: scale, rotate about `rotation_axis` by `rotation_angle` (rad), translate. */
+typedef struct SkiffGeometryDef {
+    SkiffGeometryKind kind;
+    const char *file;                 /* mesh: OBJ file, closed */
+    float size[3];                    /* box: edge lengths, centred on the origin, m */
+    float radius;                     /* sphere, centred on the origin, m */
+    const float (*plane_points)[3];   /* planes: convex region (p - point) . normal <= 0; normals point out */
+    const float (*plane_normals)[3];
+    int plane_count;
+    float scale[3];
+    float rotation_axis[3];
+    float rotation_angle;
+    float translation[3];
+} SkiffGeometryDef;
+
+/* The walls around the fluid: the inside of a closed geometry. */
+typedef struct SkiffTankDef {
+    SkiffGeometryDef geometry; /* kind NONE: no tank */
+    bool open;                 /* boxes: no lid */
+    float wet_height;          /* only walls below this y are sampled, m; INFINITY: all */
+} SkiffTankDef;
+
+/* An axis-aligned block on a cubic lattice of spacing d: round((end - start) / d) particles along each axis, at least one. */
+typedef struct SkiffBlockDef {
+    float start[3], end[3]; /* m */
+    float velocity[3];      /* m/s */
+    double time;            /* s, when it is emitted; <= 0: at the start */
+    double period;          /* s between repetitions */
+    int repeat;             /* how many times in all, >= 1 */
+} SkiffBlockDef;
+
+/* Bits of SkiffBodyDef.free_axes: translation along and rotation about the world's axes. */
+enum { SKIFF_FREE_X = 1, SKIFF_FREE_Y = 2, SKIFF_FREE_Z = 4, SKIFF_FREE_RX = 8, SKIFF_FREE_RY = 16, SKIFF_FREE_RZ = 32, SKIFF_FREE_ALL = 63 };
+
+/* A rigid body. An axis that is not free keeps the initial velocity (0: it is held). */
+typedef struct SkiffBodyDef {
+    const char *name;           /* unique, not empty */
+    SkiffGeometryDef geometry;
+    float density;              /* kg/m^3, of the uniform solid; used when mass is 0 */
+    float mass;                 /* kg, or 0 */
+    float velocity[3];          /* of the centre of mass, m/s */
+    float angular_velocity[3];  /* rad/s, world axes */
+    uint32_t free_axes;         /* 0: static or prescribed */
+    double release_time;        /* s; until then the body is held still in every axis that is free afterwards */
+} SkiffBodyDef;
+
+typedef enum SkiffProbeKind {
+    SKIFF_PROBE_HEIGHT,   /* length of the vertical line at (x, z) that is under water, m: what a wave gauge reads */
+    SKIFF_PROBE_PRESSURE, /* mean pressure on the boundary samples within `radius` of a point, Pa */
+    SKIFF_PROBE_FORCE     /* force (N) and torque about the body's centre or the world origin (N m) of the fluid on an object */
+} SkiffProbeKind;
+
+typedef struct SkiffProbeDef {
+    const char *name;        /* unique, not empty */
+    SkiffProbeKind kind;
+    float point[3];          /* m; height: y is ignored */
+    float radius;            /* m; pressure: 0 means the support radius */
+    const char *object;      /* force: a body's name, or "tank"; pressure: NULL (any) or a name */
+    bool has_region;         /* force: only samples inside [min, max], in the world at the start */
+    float min[3], max[3];
+} SkiffProbeDef;
+
+typedef enum SkiffSimd { SKIFF_SIMD_AUTO, SKIFF_SIMD_PLAIN, SKIFF_SIMD_AVX2, SKIFF_SIMD_AVX512 } SkiffSimd;
+
+typedef struct SkiffDef {
+    SkiffParams params;
+    SkiffTankDef tank;
+    const SkiffBlockDef *blocks;
+    int block_count;
+    const SkiffBodyDef *bodies;
+    int body_count;
+    const SkiffProbeDef *probes;
+    int probe_count;
+    double start_time;                 /* s */
+    bool has_domain;                   /* false: bounds of everything, grown */
+    float domain_min[3], domain_max[3];
+    int threads;                       /* 0: the number of physical cores this process may use */
+    SkiffSimd simd;
+} SkiffDef;
+
+SkiffDef skiff_def_default(void);
+SkiffGeometryDef skiff_geometry_default(void);
+SkiffBlockDef skiff_block_default(void);
+SkiffBodyDef skiff_body_default(void);
+SkiffProbeDef skiff_probe_default(void);
+
+/* ---- Life ---- */
+
+typedef struct SkiffSim SkiffSim;
+
+/* Checks everything, then builds. NULL with ERR_INPUT: every problem found, one a line, each beginning with the scene's path of it
+ * ("FluidBlocks[2]: ..."). */
+SkiffSim *skiff_create(const SkiffDef *def, Err *err);
+void skiff_destroy(SkiffSim *sim);
+
+/* One step of params.time_step. ERR_DIVERGED (step, particle, value in the message): the state is the one in which the fault was found. */
+bool skiff_step(SkiffSim *sim, Err *err);
+
+/* ---- Looking ---- */
+
+double skiff_time(const SkiffSim *sim);      /* s */
+uint64_t skiff_step_count(const SkiffSim *sim);
+const SkiffParams *skiff_params(const SkiffSim *sim);
+SkiffSimd skiff_simd(const SkiffSim *sim);   /* the one in use, never AUTO */
+const char *skiff_simd_name(SkiffSimd simd);
+int skiff_threads(const SkiffSim *sim);
+
+/* Fluid particles, in an order that changes from step to step; `id` tells who is who. Positions are window-local: add `origin`. */
+typedef struct SkiffParticles {
+    uint32_t count;
+    double origin[3];
+    const float (*position)[4]; /* m; [3] is unused */
+    const float (*velocity)[4]; /* m/s */
+    const float *density;       /* rho / rho0, at the start of the last step */
+    const float *pressure;      /* Pa, mean over the last step */
+    const uint64_t *id;         /* never reused */
+    const double *birth;        /* s */
+} SkiffParticles;
+SkiffParticles skiff_particles(const SkiffSim *sim);
+
+/* Samples of walls and bodies. Volumes after [Akinci2012]. */
+typedef struct SkiffBoundary {
+    uint32_t count;
+    const float (*position)[4]; /* m, window-local; [3]: volume, m^3 */
+    const uint32_t *object;     /* 0: tank; 1 + i: body i */
+} SkiffBoundary;
+SkiffBoundary skiff_boundary(const SkiffSim *sim);
+
+typedef struct SkiffBody {
+    const char *name;
+    double mass;                /* kg */
+    double inertia[3][3];       /* kg m^2, about the centre of mass, body axes */
+    double position[3];         /* of the centre of mass, world, m */
+    double rotation[4];         /* unit quaternion x y z w; identity at the start */
+    double velocity[3];         /* m/s */
+    double angular_velocity[3]; /* rad/s, world axes */
+    double force[3];            /* of the fluid, mean over the last step, N */
+    double torque[3];           /* about the centre of mass, N m */
+    double start_centre[3];     /* centre of mass at the start: mesh points move as p -> position + R (p - start_centre) */
+    uint32_t sample_count;
+} SkiffBody;
+int skiff_body_count(const SkiffSim *sim);
+SkiffBody skiff_body(const SkiffSim *sim, int index);
+/* Adds a force (N) and a torque about the centre of mass (N m), world axes, during the next step. */
+void skiff_body_push(SkiffSim *sim, int index, const double force[3], const double torque[3]);
+/* The body's surface as placed at the start, world coordinates; count triples of indices. Owned by the simulation. */
+void skiff_body_mesh(const SkiffSim *sim, int index, const float (**vertices)[3], uint32_t *vertex_count,
+                     const uint32_t (**triangles)[3], uint32_t *triangle_count);
+
+enum {
+#define PHASE(id, key, label) SKIFF_PHASE_##id,
+#include "phases.inl"
+#undef PHASE
+    SKIFF_PHASE_COUNT
+};
+const char *skiff_phase_key(int phase);
+const char *skiff_phase_label(int phase);
+
+typedef struct SkiffStats {
+    uint64_t step;
+    double time, dt;                  /* s, at the end of the step */
+    uint32_t particles, boundary_samples, contacts;
+    uint32_t emitted, removed;        /* during the step */
+    int density_iterations, divergence_iterations;
+    double density_error_percent;     /* mean over all particles of max(0, rho/rho0 - 1), found at the start of the step: what the last one left */
+    double density_max_percent;       /* largest rho/rho0 - 1 */
+    double divergence_error_percent;  /* mean over all of max(0, dt Drho/Dt / rho0) after the divergence solve */
+    double residual_percent;          /* mean two-sided residual of the density solve */
+    double neighbours;                /* mean number of fluid and boundary neighbours, without the particle itself */
+    double mean_speed, max_speed;     /* m/s */
+    double mean_height;               /* mean y, m */
+    double kinetic_energy, potential_energy; /* J, of the fluid */
+    double momentum[3];               /* kg m/s, of the fluid */
+    double phase_ms[SKIFF_PHASE_COUNT];
+    double step_ms;
+} SkiffStats;
+const SkiffStats *skiff_stats(const SkiffSim *sim);
+
+/* Probe channels, in the order of the def: a height or pressure gives one value, a force six (fx fy fz tx ty tz). */
+int skiff_probe_channel_count(const SkiffSim *sim);
+const char *skiff_probe_channel_name(const SkiffSim *sim, int channel); /* "name" or "name.fx" */
+void skiff_probe_read(const SkiffSim *sim, double *values);
+
+/* XXH3 of the whole state: time, particles, warm starts, bodies. Equal for equal states whatever threads, ISA or machine made them. */
+uint64_t skiff_hash(const SkiffSim *sim);
+
+/* Bytes held by the simulation. */
+uint64_t skiff_memory(const SkiffSim *sim);
+
+/* ---- States ---- */
+
+/* Saves everything that the next steps depend on. ERR_IO: the old file, if any, is intact. */
+bool skiff_save(const SkiffSim *sim, const char *path, Err *err);
+/* Replaces the state of a simulation made from the same def. ERR_INPUT when the file is damaged or belongs to another def; sim is then unchanged. */
+bool skiff_load(SkiffSim *sim, const char *path, Err *err);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
