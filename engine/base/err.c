@@ -7,6 +7,7 @@
 #include <string.h>
 
 /* Formats into a whole message buffer and marks a cut with "...". */
+ERR_PRINTF(2, 0)
 static void format_message(char out[ERR_MESSAGE_SIZE], const char *format, va_list args) {
     int length = vsnprintf(out, ERR_MESSAGE_SIZE, format, args);
     if (length < 0)

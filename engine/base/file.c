@@ -76,7 +76,7 @@ bool file_begin(FileWriter *writer, const char *path, Err *err) {
     if (length == 0)
         return err_set(err, ERR_IO, "cannot write a file without a name");
     if (length + sizeof ".tmp" > sizeof writer->temporary)
-        return err_set(err, ERR_IO, "%s: cannot write: %s", path, strerror(ENAMETOOLONG));
+        return err_set(err, ERR_IO, "%.64s...: cannot write: %s", path, strerror(ENAMETOOLONG));
     if (path[length - 1] == '/' || (stat(path, &status) == 0 && S_ISDIR(status.st_mode)))
         return err_set(err, ERR_IO, "%s: cannot write: %s", path, strerror(EISDIR));
     memcpy(writer->path, path, length + 1);
@@ -146,9 +146,10 @@ static bool make_one(const char *path) {
 bool file_make_directory(const char *path, Err *err) {
     char part[4096];
     size_t length = strlen(path);
-    if (length == 0 || length >= sizeof part)
-        return err_set(err, ERR_IO, "%s: cannot make directory: %s", path,
-                       strerror(length == 0 ? ENOENT : ENAMETOOLONG));
+    if (length == 0)
+        return err_set(err, ERR_IO, "cannot make a directory without a name");
+    if (length >= sizeof part)
+        return err_set(err, ERR_IO, "%.64s...: cannot make directory: %s", path, strerror(ENAMETOOLONG));
     memcpy(part, path, length + 1);
     for (size_t i = 1; i <= length; i++) {
         if (part[i] != '/' && part[i] != '\0')
