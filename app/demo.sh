@@ -1,0 +1,20 @@
+#!/bin/sh
+# Installs what is missing (as root, on Debian), builds Skiff and runs its main job. Works from any folder.
+# BUILD_DIR: another build folder than build/.
+set -eu
+root=$(CDPATH='' cd -- "$(dirname -- "$0")/.." && pwd)
+. "$root/app/setup.sh"
+
+setup_packages build
+build=$(setup_build_dir)
+# A first build leaves the tests out, and their packages with them; a folder that has them keeps them.
+if [ -f "$build/CMakeCache.txt" ]; then
+    setup_configure "$build" -DCMAKE_BUILD_TYPE=Release
+else
+    setup_configure "$build" -DCMAKE_BUILD_TYPE=Release -DSKIFF_TESTS=OFF
+fi
+setup_compile "$build" --target skiff_app
+
+cd "$root"
+"$build/skiff" run assets/scenes/settling-tank.json -o out/demo --force
+echo "The report is $root/out/demo/report.html"
