@@ -179,32 +179,32 @@ typedef struct SkiffParticles {
 } SkiffParticles;
 SkiffParticles skiff_particles(const SkiffSim *sim);
 
-/* Samples of walls and bodies. Volumes after [Akinci2012]. */
+/* Samples of walls and of bodies. Volumes after [Akinci2012]. */
 typedef struct SkiffBoundary {
     uint32_t count;
     const float (*position)[4]; /* m, window-local; [3]: volume, m^3 */
-    const uint32_t *object;     /* 0: tank; 1 + i: body i */
+    const int32_t *object;      /* 0: tank; 1 + i: body i */
 } SkiffBoundary;
-SkiffBoundary skiff_boundary(const SkiffSim *sim);
+/* Of all that never moves, or of all that may. */
+void skiff_boundary_samples(const SkiffSim *sim, bool moving, SkiffBoundary *view);
 
 typedef struct SkiffBody {
     const char *name;
     double mass;                /* kg */
     double inertia[3][3];       /* kg m^2, about the centre of mass, body axes */
     double position[3];         /* of the centre of mass, world, m */
-    double rotation[4];         /* unit quaternion x y z w; identity at the start */
+    double rotation[4];         /* unit quaternion x y z w; identity at the start, whatever the geometry's own rotation */
     double velocity[3];         /* m/s */
     double angular_velocity[3]; /* rad/s, world axes */
     double force[3];            /* of the fluid, mean over the last step, N */
     double torque[3];           /* about the centre of mass, N m */
-    double start_centre[3];     /* centre of mass at the start: mesh points move as p -> position + R (p - start_centre) */
     uint32_t sample_count;
 } SkiffBody;
 int skiff_body_count(const SkiffSim *sim);
 SkiffBody skiff_body(const SkiffSim *sim, int index);
 /* Adds a force (N) and a torque about the centre of mass (N m), world axes, during the next step. */
 void skiff_body_push(SkiffSim *sim, int index, const double force[3], const double torque[3]);
-/* The body's surface as placed at the start, world coordinates; count triples of indices. Owned by the simulation. */
+/* The body's surface in body axes, relative to the centre of mass: a point p is at position + R p in the world. Owned by the simulation. */
 void skiff_body_mesh(const SkiffSim *sim, int index, const float (**vertices)[3], uint32_t *vertex_count,
                      const uint32_t (**triangles)[3], uint32_t *triangle_count);
 

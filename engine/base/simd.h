@@ -1,0 +1,552 @@
+/* Sixteen float lanes, whatever the machine: one AVX-512 register, two AVX2 registers, or a plain array.
+ *
+ * Every operation here gives the same bits on every path (IEEE single operations, explicit fused multiply-add, fixed reduction trees), so
+ * a pass written with it once gives the same result on every instruction set. No approximate instruction (rcp, rsqrt) is used: they differ
+ * between vendors. Included by passes.c only, which defines SIMD_AVX512, SIMD_AVX2 or neither. */
+#ifndef SKIFF_BASE_SIMD_H
+#define SKIFF_BASE_SIMD_H
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#if defined(SIMD_AVX512) || defined(SIMD_AVX2)
+#include <immintrin.h>
+#endif
+
+enum { LANES = 16 };
+
+typedef float Float4[4];
+
+#if defined(SIMD_AVX512)
+
+typedef __m512 Vf;
+typedef __m512i Vi;
+typedef __mmask16 Vm;
+
+static inline Vf vf_set(float a) {
+    return _mm512_set1_ps(a);
+}
+static inline Vf vf_load(const float *p) {
+    return _mm512_loadu_ps(p);
+}
+static inline void vf_store(float *p, Vf a) {
+    _mm512_storeu_ps(p, a);
+}
+static inline Vf vf_add(Vf a, Vf b) {
+    return _mm512_add_ps(a, b);
+}
+static inline Vf vf_sub(Vf a, Vf b) {
+    return _mm512_sub_ps(a, b);
+}
+static inline Vf vf_mul(Vf a, Vf b) {
+    return _mm512_mul_ps(a, b);
+}
+static inline Vf vf_div(Vf a, Vf b) {
+    return _mm512_div_ps(a, b);
+}
+static inline Vf vf_sqrt(Vf a) {
+    return _mm512_sqrt_ps(a);
+}
+static inline Vf vf_max(Vf a, Vf b) {
+    return _mm512_max_ps(a, b);
+}
+static inline Vf vf_min(Vf a, Vf b) {
+    return _mm512_min_ps(a, b);
+}
+/* a * b + c, rounded once */
+static inline Vf vf_fma(Vf a, Vf b, Vf c) {
+    return _mm512_fmadd_ps(a, b, c);
+}
+/* c - a * b, rounded once */
+static inline Vf vf_fnma(Vf a, Vf b, Vf c) {
+    return _mm512_fnmadd_ps(a, b, c);
+}
+static inline Vm vf_less(Vf a, Vf b) {
+    return _mm512_cmp_ps_mask(a, b, _CMP_LT_OQ);
+}
+static inline Vf vf_select(Vm m, Vf yes, Vf no) {
+    return _mm512_mask_blend_ps(m, no, yes);
+}
+static inline Vi vi_set(int32_t a) {
+    return _mm512_set1_epi32(a);
+}
+static inline Vi vi_load(const int32_t *p) {
+    return _mm512_loadu_si512(p);
+}
+static inline Vi vi_add(Vi a, Vi b) {
+    return _mm512_add_epi32(a, b);
+}
+static inline void vi_store(int32_t *p, Vi a) {
+    _mm512_storeu_si512(p, a);
+}
+static inline Vi vi_load_i16(const int16_t *p) {
+    return _mm512_cvtepi16_epi32(_mm256_loadu_si256((const __m256i *)p));
+}
+/* keeps the low 16 bits: the caller has checked the range */
+static inline void vi_store_i16(int16_t *p, Vi a) {
+    _mm256_storeu_si256((__m256i *)p, _mm512_cvtepi32_epi16(a));
+}
+static inline Vm vi_equal(Vi a, Vi b) {
+    return _mm512_cmpeq_epi32_mask(a, b);
+}
+static inline Vm vi_less(Vi a, Vi b) {
+    return _mm512_cmplt_epi32_mask(a, b);
+}
+static inline Vi vi_select(Vm m, Vi yes, Vi no) {
+    return _mm512_mask_blend_epi32(m, no, yes);
+}
+static inline Vf vf_load_i16(const int16_t *p) {
+    return _mm512_cvtepi32_ps(vi_load_i16(p));
+}
+/* to nearest even; |a| <= 32767 */
+static inline void vf_store_i16(int16_t *p, Vf a) {
+    vi_store_i16(p, _mm512_cvtps_epi32(a));
+}
+static inline Vf vf_gather(const float *base, Vi index) {
+    return _mm512_i32gather_ps(index, base, 4);
+}
+static inline Vi vi_gather(const int32_t *base, Vi index) {
+    return _mm512_i32gather_epi32(index, base, 4);
+}
+static inline void vf_transpose4(__m512 r[4], Vf *x, Vf *y, Vf *z, Vf *w) {
+    __m512 t0 = _mm512_unpacklo_ps(r[0], r[1]), t1 = _mm512_unpackhi_ps(r[0], r[1]);
+    __m512 t2 = _mm512_unpacklo_ps(r[2], r[3]), t3 = _mm512_unpackhi_ps(r[2], r[3]);
+    *x = _mm512_castpd_ps(_mm512_unpacklo_pd(_mm512_castps_pd(t0), _mm512_castps_pd(t2)));
+    *y = _mm512_castpd_ps(_mm512_unpackhi_pd(_mm512_castps_pd(t0), _mm512_castps_pd(t2)));
+    *z = _mm512_castpd_ps(_mm512_unpacklo_pd(_mm512_castps_pd(t1), _mm512_castps_pd(t3)));
+    *w = _mm512_castpd_ps(_mm512_unpackhi_pd(_mm512_castps_pd(t1), _mm512_castps_pd(t3)));
+}
+/* Four floats each of base[index[lane]]. One 128-bit load a lane and a transpose beat four gathers by a third. */
+static inline void vf_gather4(const Float4 *base, Vi index, Vf *x, Vf *y, Vf *z, Vf *w) {
+    int32_t id[LANES] __attribute__((aligned(64)));
+    _mm512_store_si512(id, index);
+    __m512 r[4];
+    for (int k = 0; k < 4; k++) {
+        r[k] = _mm512_castps128_ps512(_mm_loadu_ps(base[id[k]]));
+        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(base[id[4 + k]]), 1);
+        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(base[id[8 + k]]), 2);
+        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(base[id[12 + k]]), 3);
+    }
+    vf_transpose4(r, x, y, z, w);
+}
+/* Sixteen consecutive Float4 to four registers. */
+static inline void vf_load4(const Float4 *p, Vf *x, Vf *y, Vf *z, Vf *w) {
+    __m512 r[4];
+    for (int k = 0; k < 4; k++) {
+        r[k] = _mm512_castps128_ps512(_mm_loadu_ps(p[k]));
+        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(p[4 + k]), 1);
+        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(p[8 + k]), 2);
+        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(p[12 + k]), 3);
+    }
+    vf_transpose4(r, x, y, z, w);
+}
+static inline void vf_store4(Float4 *p, Vf x, Vf y, Vf z, Vf w) {
+    __m512 r[4] = {x, y, z, w}, a, b, c, d;
+    vf_transpose4(r, &a, &b, &c, &d);
+    __m512 out[4] = {a, b, c, d};
+    for (int k = 0; k < 4; k++) {
+        _mm_storeu_ps(p[k], _mm512_castps512_ps128(out[k]));
+        _mm_storeu_ps(p[4 + k], _mm512_extractf32x4_ps(out[k], 1));
+        _mm_storeu_ps(p[8 + k], _mm512_extractf32x4_ps(out[k], 2));
+        _mm_storeu_ps(p[12 + k], _mm512_extractf32x4_ps(out[k], 3));
+    }
+}
+/* Bit pattern shifted right by one and subtracted from `magic`: the seed of vf_rsqrt. */
+static inline Vf vf_rsqrt_seed(Vf a, int32_t magic) {
+    return _mm512_castsi512_ps(
+        _mm512_sub_epi32(_mm512_set1_epi32(magic), _mm512_srli_epi32(_mm512_castps_si512(a), 1)));
+}
+static inline float vf_sum(Vf a) {
+    __m256 h = _mm256_add_ps(_mm512_castps512_ps256(a), _mm512_extractf32x8_ps(a, 1));
+    __m128 q = _mm_add_ps(_mm256_castps256_ps128(h), _mm256_extractf128_ps(h, 1));
+    q = _mm_add_ps(q, _mm_movehl_ps(q, q));
+    return _mm_cvtss_f32(_mm_add_ss(q, _mm_movehdup_ps(q)));
+}
+/* Appends ids[lane] to out for every set lane, in lane order; may write up to 16 places; returns how many count. */
+static inline int vi_compress(int32_t *out, const int32_t *ids, Vm m) {
+    /* compress in the register, then store: compressing to memory is microcoded on Zen 4 */
+    _mm512_storeu_si512(out, _mm512_maskz_compress_epi32(m, _mm512_loadu_si512(ids)));
+    return __builtin_popcount(m);
+}
+
+#elif defined(SIMD_AVX2)
+
+typedef struct Vf {
+    __m256 a, b;
+} Vf;
+typedef struct Vi {
+    __m256i a, b;
+} Vi;
+typedef uint32_t Vm;
+
+#define VF(x, y)                                                                                             \
+    (Vf) {                                                                                                   \
+        x, y                                                                                                 \
+    }
+static inline Vf vf_set(float v) {
+    return VF(_mm256_set1_ps(v), _mm256_set1_ps(v));
+}
+static inline Vf vf_load(const float *p) {
+    return VF(_mm256_loadu_ps(p), _mm256_loadu_ps(p + 8));
+}
+static inline void vf_store(float *p, Vf v) {
+    _mm256_storeu_ps(p, v.a);
+    _mm256_storeu_ps(p + 8, v.b);
+}
+static inline Vf vf_add(Vf u, Vf v) {
+    return VF(_mm256_add_ps(u.a, v.a), _mm256_add_ps(u.b, v.b));
+}
+static inline Vf vf_sub(Vf u, Vf v) {
+    return VF(_mm256_sub_ps(u.a, v.a), _mm256_sub_ps(u.b, v.b));
+}
+static inline Vf vf_mul(Vf u, Vf v) {
+    return VF(_mm256_mul_ps(u.a, v.a), _mm256_mul_ps(u.b, v.b));
+}
+static inline Vf vf_div(Vf u, Vf v) {
+    return VF(_mm256_div_ps(u.a, v.a), _mm256_div_ps(u.b, v.b));
+}
+static inline Vf vf_sqrt(Vf u) {
+    return VF(_mm256_sqrt_ps(u.a), _mm256_sqrt_ps(u.b));
+}
+static inline Vf vf_max(Vf u, Vf v) {
+    return VF(_mm256_max_ps(u.a, v.a), _mm256_max_ps(u.b, v.b));
+}
+static inline Vf vf_min(Vf u, Vf v) {
+    return VF(_mm256_min_ps(u.a, v.a), _mm256_min_ps(u.b, v.b));
+}
+static inline Vf vf_fma(Vf u, Vf v, Vf w) {
+    return VF(_mm256_fmadd_ps(u.a, v.a, w.a), _mm256_fmadd_ps(u.b, v.b, w.b));
+}
+static inline Vf vf_fnma(Vf u, Vf v, Vf w) {
+    return VF(_mm256_fnmadd_ps(u.a, v.a, w.a), _mm256_fnmadd_ps(u.b, v.b, w.b));
+}
+static inline Vm vf_less(Vf u, Vf v) {
+    uint32_t lo = (uint32_t)_mm256_movemask_ps(_mm256_cmp_ps(u.a, v.a, _CMP_LT_OQ));
+    return lo | (uint32_t)_mm256_movemask_ps(_mm256_cmp_ps(u.b, v.b, _CMP_LT_OQ)) << 8;
+}
+static inline __m256i vm_expand(Vm m) {
+    const __m256i bit = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+    return _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32((int)m), bit), bit);
+}
+static inline Vf vf_select(Vm m, Vf yes, Vf no) {
+    return VF(_mm256_blendv_ps(no.a, yes.a, _mm256_castsi256_ps(vm_expand(m))),
+              _mm256_blendv_ps(no.b, yes.b, _mm256_castsi256_ps(vm_expand(m >> 8))));
+}
+static inline Vi vi_set(int32_t v) {
+    return (Vi){_mm256_set1_epi32(v), _mm256_set1_epi32(v)};
+}
+static inline Vi vi_load(const int32_t *p) {
+    return (Vi){_mm256_loadu_si256((const __m256i *)p), _mm256_loadu_si256((const __m256i *)(p + 8))};
+}
+static inline Vi vi_add(Vi u, Vi v) {
+    return (Vi){_mm256_add_epi32(u.a, v.a), _mm256_add_epi32(u.b, v.b)};
+}
+static inline void vi_store(int32_t *p, Vi v) {
+    _mm256_storeu_si256((__m256i *)p, v.a);
+    _mm256_storeu_si256((__m256i *)(p + 8), v.b);
+}
+static inline Vi vi_load_i16(const int16_t *p) {
+    return (Vi){_mm256_cvtepi16_epi32(_mm_loadu_si128((const __m128i *)p)),
+                _mm256_cvtepi16_epi32(_mm_loadu_si128((const __m128i *)(p + 8)))};
+}
+static inline void vi_store_i16(int16_t *p, Vi v) {
+    __m256i packed = _mm256_permute4x64_epi64(_mm256_packs_epi32(v.a, v.b), 0xD8);
+    _mm256_storeu_si256((__m256i *)p, packed);
+}
+static inline Vm vi_mask(__m256i a, __m256i b) {
+    return (uint32_t)_mm256_movemask_ps(_mm256_castsi256_ps(a)) |
+           (uint32_t)_mm256_movemask_ps(_mm256_castsi256_ps(b)) << 8;
+}
+static inline Vm vi_equal(Vi u, Vi v) {
+    return vi_mask(_mm256_cmpeq_epi32(u.a, v.a), _mm256_cmpeq_epi32(u.b, v.b));
+}
+static inline Vm vi_less(Vi u, Vi v) {
+    return vi_mask(_mm256_cmpgt_epi32(v.a, u.a), _mm256_cmpgt_epi32(v.b, u.b));
+}
+static inline Vi vi_select(Vm m, Vi yes, Vi no) {
+    return (Vi){_mm256_blendv_epi8(no.a, yes.a, vm_expand(m)),
+                _mm256_blendv_epi8(no.b, yes.b, vm_expand(m >> 8))};
+}
+static inline Vf vf_load_i16(const int16_t *p) {
+    Vi i = vi_load_i16(p);
+    return VF(_mm256_cvtepi32_ps(i.a), _mm256_cvtepi32_ps(i.b));
+}
+static inline void vf_store_i16(int16_t *p, Vf v) {
+    vi_store_i16(p, (Vi){_mm256_cvtps_epi32(v.a), _mm256_cvtps_epi32(v.b)});
+}
+static inline Vf vf_gather(const float *base, Vi index) {
+    return VF(_mm256_i32gather_ps(base, index.a, 4), _mm256_i32gather_ps(base, index.b, 4));
+}
+static inline Vi vi_gather(const int32_t *base, Vi index) {
+    return (Vi){_mm256_i32gather_epi32(base, index.a, 4), _mm256_i32gather_epi32(base, index.b, 4)};
+}
+/* r[k] holds points k (low half) and 4 + k (high half) */
+static inline void avx2_transpose4(const __m256 r[4], __m256 out[4]) {
+    __m256 t0 = _mm256_unpacklo_ps(r[0], r[1]), t1 = _mm256_unpackhi_ps(r[0], r[1]);
+    __m256 t2 = _mm256_unpacklo_ps(r[2], r[3]), t3 = _mm256_unpackhi_ps(r[2], r[3]);
+    out[0] = _mm256_shuffle_ps(t0, t2, 0x44);
+    out[1] = _mm256_shuffle_ps(t0, t2, 0xEE);
+    out[2] = _mm256_shuffle_ps(t1, t3, 0x44);
+    out[3] = _mm256_shuffle_ps(t1, t3, 0xEE);
+}
+static inline void avx2_gather4(const Float4 *base, const int32_t *id, __m256 out[4]) {
+    __m256 r[4];
+    for (int k = 0; k < 4; k++)
+        r[k] = _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(base[id[k]])),
+                                    _mm_loadu_ps(base[id[4 + k]]), 1);
+    avx2_transpose4(r, out);
+}
+static inline void vf_gather4(const Float4 *base, Vi index, Vf *x, Vf *y, Vf *z, Vf *w) {
+    int32_t id[LANES];
+    vi_store(id, index);
+    __m256 lo[4], hi[4];
+    avx2_gather4(base, id, lo);
+    avx2_gather4(base, id + 8, hi);
+    *x = VF(lo[0], hi[0]);
+    *y = VF(lo[1], hi[1]);
+    *z = VF(lo[2], hi[2]);
+    *w = VF(lo[3], hi[3]);
+}
+static inline void vf_load4(const Float4 *p, Vf *x, Vf *y, Vf *z, Vf *w) {
+    static const int32_t id[8] = {0, 1, 2, 3, 4, 5, 6, 7};
+    __m256 lo[4], hi[4];
+    avx2_gather4(p, id, lo);
+    avx2_gather4(p + 8, id, hi);
+    *x = VF(lo[0], hi[0]);
+    *y = VF(lo[1], hi[1]);
+    *z = VF(lo[2], hi[2]);
+    *w = VF(lo[3], hi[3]);
+}
+static inline void avx2_store4(Float4 *p, __m256 x, __m256 y, __m256 z, __m256 w) {
+    __m256 r[4] = {x, y, z, w}, out[4];
+    avx2_transpose4(r, out);
+    for (int k = 0; k < 4; k++) {
+        _mm_storeu_ps(p[k], _mm256_castps256_ps128(out[k]));
+        _mm_storeu_ps(p[4 + k], _mm256_extractf128_ps(out[k], 1));
+    }
+}
+static inline void vf_store4(Float4 *p, Vf x, Vf y, Vf z, Vf w) {
+    avx2_store4(p, x.a, y.a, z.a, w.a);
+    avx2_store4(p + 8, x.b, y.b, z.b, w.b);
+}
+static inline __m256 avx2_rsqrt_seed(__m256 v, int32_t magic) {
+    return _mm256_castsi256_ps(
+        _mm256_sub_epi32(_mm256_set1_epi32(magic), _mm256_srli_epi32(_mm256_castps_si256(v), 1)));
+}
+static inline Vf vf_rsqrt_seed(Vf v, int32_t magic) {
+    return VF(avx2_rsqrt_seed(v.a, magic), avx2_rsqrt_seed(v.b, magic));
+}
+static inline float vf_sum(Vf v) {
+    __m256 h = _mm256_add_ps(v.a, v.b);
+    __m128 q = _mm_add_ps(_mm256_castps256_ps128(h), _mm256_extractf128_ps(h, 1));
+    q = _mm_add_ps(q, _mm_movehl_ps(q, q));
+    return _mm_cvtss_f32(_mm_add_ss(q, _mm_movehdup_ps(q)));
+}
+static inline int vi_compress(int32_t *out, const int32_t *ids, Vm m) {
+    int n = 0;
+    for (; m != 0; m &= m - 1) /* few lanes are set: walking the bits beats a table of shuffles */
+        out[n++] = ids[__builtin_ctz(m)];
+    return n;
+}
+
+#else
+
+typedef struct Vf {
+    float v[LANES];
+} Vf;
+typedef struct Vi {
+    int32_t v[LANES];
+} Vi;
+typedef uint32_t Vm;
+
+#define EACH_LANE for (int l = 0; l < LANES; l++)
+static inline Vf vf_set(float a) {
+    Vf r;
+    EACH_LANE r.v[l] = a;
+    return r;
+}
+static inline Vf vf_load(const float *p) {
+    Vf r;
+    memcpy(r.v, p, sizeof r.v);
+    return r;
+}
+static inline void vf_store(float *p, Vf a) {
+    memcpy(p, a.v, sizeof a.v);
+}
+static inline Vf vf_add(Vf a, Vf b) {
+    EACH_LANE a.v[l] += b.v[l];
+    return a;
+}
+static inline Vf vf_sub(Vf a, Vf b) {
+    EACH_LANE a.v[l] -= b.v[l];
+    return a;
+}
+static inline Vf vf_mul(Vf a, Vf b) {
+    EACH_LANE a.v[l] *= b.v[l];
+    return a;
+}
+static inline Vf vf_div(Vf a, Vf b) {
+    EACH_LANE a.v[l] /= b.v[l];
+    return a;
+}
+static inline Vf vf_sqrt(Vf a) {
+    EACH_LANE a.v[l] = sqrtf(a.v[l]);
+    return a;
+}
+static inline Vf vf_max(Vf a, Vf b) {
+    EACH_LANE a.v[l] = a.v[l] > b.v[l] ? a.v[l] : b.v[l];
+    return a;
+}
+static inline Vf vf_min(Vf a, Vf b) {
+    EACH_LANE a.v[l] = a.v[l] < b.v[l] ? a.v[l] : b.v[l];
+    return a;
+}
+static inline Vf vf_fma(Vf a, Vf b, Vf c) {
+    EACH_LANE c.v[l] = fmaf(a.v[l], b.v[l], c.v[l]);
+    return c;
+}
+static inline Vf vf_fnma(Vf a, Vf b, Vf c) {
+    EACH_LANE c.v[l] = fmaf(-a.v[l], b.v[l], c.v[l]);
+    return c;
+}
+static inline Vm vf_less(Vf a, Vf b) {
+    Vm m = 0;
+    EACH_LANE m |= (Vm)(a.v[l] < b.v[l]) << l;
+    return m;
+}
+static inline Vf vf_select(Vm m, Vf yes, Vf no) {
+    EACH_LANE no.v[l] = m >> l & 1 ? yes.v[l] : no.v[l];
+    return no;
+}
+static inline Vi vi_set(int32_t a) {
+    Vi r;
+    EACH_LANE r.v[l] = a;
+    return r;
+}
+static inline Vi vi_load(const int32_t *p) {
+    Vi r;
+    memcpy(r.v, p, sizeof r.v);
+    return r;
+}
+static inline Vi vi_add(Vi a, Vi b) {
+    EACH_LANE a.v[l] += b.v[l];
+    return a;
+}
+static inline void vi_store(int32_t *p, Vi a) {
+    memcpy(p, a.v, sizeof a.v);
+}
+static inline Vi vi_load_i16(const int16_t *p) {
+    Vi r;
+    EACH_LANE r.v[l] = p[l];
+    return r;
+}
+static inline void vi_store_i16(int16_t *p, Vi a) {
+    EACH_LANE p[l] = (int16_t)a.v[l];
+}
+static inline Vm vi_equal(Vi a, Vi b) {
+    Vm m = 0;
+    EACH_LANE m |= (Vm)(a.v[l] == b.v[l]) << l;
+    return m;
+}
+static inline Vm vi_less(Vi a, Vi b) {
+    Vm m = 0;
+    EACH_LANE m |= (Vm)(a.v[l] < b.v[l]) << l;
+    return m;
+}
+static inline Vi vi_select(Vm m, Vi yes, Vi no) {
+    EACH_LANE no.v[l] = m >> l & 1 ? yes.v[l] : no.v[l];
+    return no;
+}
+static inline Vf vf_load_i16(const int16_t *p) {
+    Vf r;
+    EACH_LANE r.v[l] = (float)p[l];
+    return r;
+}
+static inline void vf_store_i16(int16_t *p, Vf a) {
+    EACH_LANE p[l] = (int16_t)lrintf(a.v[l]);
+}
+static inline Vf vf_gather(const float *base, Vi index) {
+    Vf r;
+    EACH_LANE r.v[l] = base[index.v[l]];
+    return r;
+}
+static inline Vi vi_gather(const int32_t *base, Vi index) {
+    Vi r;
+    EACH_LANE r.v[l] = base[index.v[l]];
+    return r;
+}
+static inline void vf_gather4(const Float4 *base, Vi index, Vf *x, Vf *y, Vf *z, Vf *w) {
+    EACH_LANE {
+        const float *p = base[index.v[l]];
+        x->v[l] = p[0];
+        y->v[l] = p[1];
+        z->v[l] = p[2];
+        w->v[l] = p[3];
+    }
+}
+static inline void vf_load4(const Float4 *p, Vf *x, Vf *y, Vf *z, Vf *w) {
+    EACH_LANE {
+        x->v[l] = p[l][0];
+        y->v[l] = p[l][1];
+        z->v[l] = p[l][2];
+        w->v[l] = p[l][3];
+    }
+}
+static inline void vf_store4(Float4 *p, Vf x, Vf y, Vf z, Vf w) {
+    EACH_LANE {
+        p[l][0] = x.v[l];
+        p[l][1] = y.v[l];
+        p[l][2] = z.v[l];
+        p[l][3] = w.v[l];
+    }
+}
+static inline Vf vf_rsqrt_seed(Vf a, int32_t magic) {
+    EACH_LANE {
+        uint32_t bits;
+        memcpy(&bits, &a.v[l], 4);
+        bits = (uint32_t)magic - (bits >> 1);
+        memcpy(&a.v[l], &bits, 4);
+    }
+    return a;
+}
+static inline float vf_sum(Vf a) {
+    for (int width = 8; width >= 1; width /= 2)
+        for (int l = 0; l < width; l++)
+            a.v[l] += a.v[l + width];
+    return a.v[0];
+}
+static inline int vi_compress(int32_t *out, const int32_t *ids, Vm m) {
+    int n = 0;
+    for (; m != 0; m &= m - 1)
+        out[n++] = ids[__builtin_ctz(m)];
+    return n;
+}
+#undef EACH_LANE
+
+#endif
+
+/* ---- On top of the above, the same text on every path ---- */
+
+static inline Vf vf_zero(void) {
+    return vf_set(0.0f);
+}
+static inline Vf vf_mask(Vm m, Vf a) {
+    return vf_select(m, a, vf_zero());
+}
+static inline Vi vi_lane(void) {
+    static const int32_t lane[LANES] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    return vi_load(lane);
+}
+
+/* 1 / sqrt(a), relative error below 3e-7 for normal a > 0: the bit trick of [Lomont 2003] and three Newton steps. A division and a square root
+ * take three times as long, and the machines' own estimates differ from vendor to vendor. */
+static inline Vf vf_rsqrt(Vf a) {
+    const Vf half = vf_mul(a, vf_set(0.5f)), three_halves = vf_set(1.5f);
+    Vf y = vf_rsqrt_seed(a, 0x5f375a86);
+    for (int k = 0; k < 3; k++)
+        y = vf_mul(y, vf_fnma(vf_mul(half, y), y, three_halves));
+    return y;
+}
+
+#endif

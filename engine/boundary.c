@@ -1,0 +1,342 @@
+/* Boundary samples: making, weighing, moving and sorting them, and the terms they give the particles near them. Samples are not visited again after
+ * boundary_apply: the solvers work with the contacts [DESIGN sec. 4]. */
+#include "boundary.h"
+
+#include <math.h>
+#include <omp.h>
+#include <stdlib.h>
+
+static bool samples_grow(BoundarySamples *samples, uint32_t extra) {
+    const uint32_t need = samples->count + extra;
+    if (need <= samples->capacity)
+        return true;
+    void *position = realloc(samples->position, need * sizeof *samples->position);
+    samples->position = position ? position : samples->position;
+    void *volume = realloc(samples->volume, need * sizeof *samples->volume);
+    samples->volume = volume ? volume : samples->volume;
+    void *area = realloc(samples->area, need * sizeof *samples->area);
+    samples->area = area ? area : samples->area;
+    void *normal = realloc(samples->normal, need * sizeof *samples->normal);
+    samples->normal = normal ? normal : samples->normal;
+    void *object = realloc(samples->object, need * sizeof *samples->object);
+    samples->object = object ? object : samples->object;
+    if (!position || !volume || !area || !normal || !object)
+        return false;
+    samples->capacity = need;
+    return true;
+}
+
+bool boundary_add(BoundarySet *set, const Mesh *mesh, int32_t object, float spacing, const SampleRegion *region,
+                  const char *path, Err *err) {
+    enum { MAX_SAMPLES = 50000000 };
+    SamplePoint *points = NULL;
+    uint32_t count = 0;
+    Err reason = {0};
+    if (!sample_surface(mesh, spacing, region, MAX_SAMPLES, &points, &count, &reason))
+        return err_add(err, reason.code, "%s: %s", path, reason.message);
+    BoundarySamples *samples = &set->samples;
+    if (!samples_grow(samples, count)) {
+        free(points);
+        return err_add(err, ERR_INPUT, "%s: no memory for %u boundary samples", path, count);
+    }
+    for (uint32_t s = 0; s < count; s++) {
+        const uint32_t to = samples->count++;
+        memcpy(samples->position[to], points[s].position, sizeof samples->position[to]);
+        memcpy(samples->normal[to], points[s].normal, sizeof samples->normal[to]);
+        samples->area[to] = points[s].area;
+        samples->object[to] = object;
+        samples->volume[to] = 0.0f;
+    }
+    free(points);
+    return true;
+}
+
+/* ---- Cells ---- */
+
+static bool set_reserve(BoundarySet *set, size_t cells, Err *err) {
+    const size_t padded = set->samples.count + SLICE;
+    /* x, y, z, volume, object, origin of the sorted samples, then their world positions */
+    if (!buffer_reserve(&set->buffer, "boundary samples", padded * (6 * sizeof(float) + sizeof(Float4)), err))
+        return false;
+    if (set->cells.size < (cells + 1) * sizeof(uint32_t) &&
+        !buffer_reserve(&set->cells, "boundary cells", (cells + cells / 3 + 1) * sizeof(uint32_t), err))
+        return false;
+    if (set->occupied.size < cells && !buffer_reserve(&set->occupied, "boundary occupancy", cells + cells / 3, err))
+        return false;
+    Float4 *world = set->buffer.data;
+    float *x = (float *)(world + padded);
+    set->world = world;
+    set->sorted.x = x;
+    set->sorted.y = x + padded;
+    set->sorted.z = x + 2 * padded;
+    set->sorted.volume = x + 3 * padded;
+    set->sorted.object = (int32_t *)(x + 4 * padded);
+    set->origin = (uint32_t *)(x + 5 * padded);
+    set->sorted.grid.start = set->cells.data;
+    set->sorted.occupied = set->occupied.data;
+    return true;
+}
+
+static void mark_occupied(const CellGrid *grid, uint8_t *occupied) {
+    const size_t cells = (size_t)grid->size[0] * (size_t)grid->size[1] * (size_t)grid->size[2];
+    memset(occupied, 0, cells);
+    for (int32_t x = 1; x + 1 < grid->size[0]; x++)
+        for (int32_t z = 1; z + 1 < grid->size[2]; z++)
+            for (int32_t y = 1; y + 1 < grid->size[1]; y++) {
+                const int32_t cell = cell_grid_index(grid, x, y, z);
+                if (grid->start[cell] == grid->start[cell + 1])
+                    continue;
+                for (int32_t dx = -1; dx <= 1; dx++)
+                    for (int32_t dz = -1; dz <= 1; dz++)
+                        memset(occupied + cell_grid_index(grid, x + dx, y - 1, z + dz), 1, 3);
+            }
+}
+
+bool boundary_sort(BoundarySet *set, float cell_size, Err *err) {
+    const uint32_t count = set->samples.count;
+    set->sorted.count = count;
+    if (count == 0)
+        return true;
+    GridBounds bounds = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    for (uint32_t s = 0; s < count; s++)
+        for (int k = 0; k < 3; k++) {
+            bounds.min[k] = fminf(bounds.min[k], set->world[s][k]);
+            bounds.max[k] = fmaxf(bounds.max[k], set->world[s][k]);
+        }
+    /* two empty layers: the 27 cells around an occupied one, and around those, exist */
+    if (!grid_layout(&set->sorted.grid, &bounds, cell_size, 2))
+        return err_set(err, ERR_DIVERGED, "the boundary samples spread over more than %d cells of %g m",
+                       GRID_MAX_CELLS, (double)cell_size);
+    const CellGrid *grid = &set->sorted.grid;
+    const size_t cells = (size_t)grid->size[0] * (size_t)grid->size[1] * (size_t)grid->size[2];
+    if (!set_reserve(set, cells, err))
+        return false;
+    uint32_t *start = set->cells.data;
+    memset(start, 0, (cells + 1) * sizeof(uint32_t));
+    for (uint32_t s = 0; s < count; s++)
+        start[grid_cell_of(grid, set->world[s]) + 1]++;
+    for (size_t c = 0; c < cells; c++)
+        start[c + 1] += start[c];
+    /* samples come grouped by object, and a stable sort keeps them so within a cell */
+    float *x = (float *)set->sorted.x, *y = (float *)set->sorted.y, *z = (float *)set->sorted.z;
+    float *volume = (float *)set->sorted.volume;
+    int32_t *object = (int32_t *)set->sorted.object;
+    for (uint32_t s = 0; s < count; s++) {
+        const uint32_t to = start[grid_cell_of(grid, set->world[s])]++;
+        x[to] = set->world[s][0];
+        y[to] = set->world[s][1];
+        z[to] = set->world[s][2];
+        volume[to] = set->world[s][3];
+        object[to] = set->samples.object[s];
+        set->origin[to] = s;
+    }
+    memmove(start + 1, start, cells * sizeof(uint32_t));
+    start[0] = 0;
+    mark_occupied(grid, set->occupied.data);
+    return true;
+}
+
+/* ---- Volumes ---- */
+
+static void sample_volumes(BoundarySet *set, const Kernel *kernel) {
+    const SampleSet *sorted = &set->sorted;
+    const CellGrid *grid = &sorted->grid;
+    const int32_t column = grid->size[1], slab = grid->size[1] * grid->size[2];
+#pragma omp parallel for schedule(dynamic, 256)
+    for (uint32_t s = 0; s < set->samples.count; s++) {
+        const float *p = set->world[s];
+        const int32_t cell = (int32_t)grid_cell_of(grid, p);
+        double sum = 0.0;
+        for (int run = 0; run < 9; run++) {
+            const int32_t middle = cell + (run / 3 - 1) * slab + (run % 3 - 1) * column;
+            for (uint32_t b = grid->start[middle - 1]; b < grid->start[middle + 2]; b++) {
+                const float dx = p[0] - sorted->x[b], dy = p[1] - sorted->y[b], dz = p[2] - sorted->z[b];
+                sum += (double)kernel_w(kernel, sqrtf(dx * dx + dy * dy + dz * dz));
+            }
+        }
+        set->samples.volume[s] = (float)(1.0 / sum);
+    }
+}
+
+bool boundary_weigh(BoundarySet *set, const Kernel *kernel, Err *err) {
+    if (set->samples.count == 0)
+        return true;
+    if (!set_reserve(set, 1, err))
+        return false;
+    for (uint32_t s = 0; s < set->samples.count; s++)
+        memcpy(set->world[s], set->samples.position[s], sizeof set->samples.position[s]);
+    if (!boundary_sort(set, kernel->support, err))
+        return false;
+    sample_volumes(set, kernel);
+    for (uint32_t s = 0; s < set->samples.count; s++)
+        set->world[s][3] = set->samples.volume[s];
+    return boundary_sort(set, kernel->support, err); /* once more: the sorted copy takes the volumes along */
+}
+
+bool boundary_append(BoundarySet *set, const BoundarySamples *more, Err *err) {
+    BoundarySamples *samples = &set->samples;
+    if (!samples_grow(samples, more->count))
+        return err_add(err, ERR_INPUT, "no memory for %u boundary samples", more->count);
+    const uint32_t to = samples->count;
+    memcpy(samples->position + to, more->position, more->count * sizeof *more->position);
+    memcpy(samples->volume + to, more->volume, more->count * sizeof *more->volume);
+    memcpy(samples->area + to, more->area, more->count * sizeof *more->area);
+    memcpy(samples->normal + to, more->normal, more->count * sizeof *more->normal);
+    memcpy(samples->object + to, more->object, more->count * sizeof *more->object);
+    samples->count += more->count;
+    return true;
+}
+
+/* ---- Steps ---- */
+
+bool boundary_reserve(Boundary *boundary, uint32_t particle_capacity, int body_count, Err *err) {
+    const size_t blocks = particle_capacity / BLOCK + 1;
+    boundary->object_count = 1 + (uint32_t)body_count;
+    /* about 2.5 samples of a wall belong to one particle beside it; two layers of particles feel them */
+    const uint32_t guess = 4096 + 2 * (boundary->fixed.samples.count + boundary->moving.samples.count);
+    if (boundary->contact_capacity < guess)
+        boundary->contact_capacity = guess;
+    if (!buffer_reserve(&boundary->contact_buffer, "contacts", boundary->contact_capacity * sizeof(Contact), err) ||
+        !buffer_reserve(&boundary->span_buffer, "contact spans", blocks * sizeof(ContactSpan), err) ||
+        !buffer_reserve(&boundary->centre_buffer, "object centres", boundary->object_count * sizeof(Float4), err) ||
+        !buffer_reserve(&boundary->partial_buffer, "impulse sums",
+                        blocks * boundary->object_count * 6 * sizeof(double), err))
+        return false;
+    boundary->contacts = boundary->contact_buffer.data;
+    boundary->spans = boundary->span_buffer.data;
+    boundary->centres = boundary->centre_buffer.data;
+    return true;
+}
+
+bool boundary_place(Boundary *boundary, const Body *bodies, int body_count, const double origin[3], float cell_size,
+                    int threads, Err *err) {
+    for (int b = 0; b < body_count; b++)
+        for (int k = 0; k < 3; k++)
+            boundary->centres[1 + b][k] = (float)(bodies[b].position[k] - origin[k]);
+    BoundarySet *set = &boundary->moving;
+    if (set->samples.count == 0)
+        return true;
+    if (set->world == NULL && !set_reserve(set, 1, err))
+        return false;
+#pragma omp parallel for schedule(static) num_threads(threads)
+    for (uint32_t s = 0; s < set->samples.count; s++) {
+        const Body *body = &bodies[set->samples.object[s] - 1];
+        const float *p = set->samples.position[s];
+        const double local[3] = {p[0], p[1], p[2]};
+        double world[3];
+        matrix_times((const double(*)[3])body->matrix, local, world);
+        for (int k = 0; k < 3; k++)
+            set->world[s][k] = (float)(world[k] + (body->position[k] - origin[k]));
+        set->world[s][3] = set->samples.volume[s];
+    }
+    return boundary_sort(set, cell_size, err);
+}
+
+/* One try: contacts of every block, appended to the common list. False: a particle touches too many objects. */
+static bool apply_blocks(Boundary *boundary, const BoundaryJob *job, const Passes *passes, Rows *rows, int threads,
+                         uint32_t *fault) {
+    const uint32_t blocks = (job->count + BLOCK - 1) / BLOCK;
+    uint32_t used = 0, first_fault = UINT32_MAX;
+#pragma omp parallel num_threads(threads) reduction(min : first_fault)
+    {
+        Scratch *scratch = rows_scratch(rows, omp_get_thread_num());
+#pragma omp for schedule(dynamic, 2)
+        for (uint32_t block = 0; block < blocks; block++) {
+            uint32_t particle = UINT32_MAX;
+            const int count = passes->boundary(job, block, scratch, &particle);
+            if (count < 0) {
+                first_fault = particle < first_fault ? particle : first_fault;
+                continue;
+            }
+            uint32_t start;
+#pragma omp atomic capture
+            {
+                start = used;
+                used += (uint32_t)count;
+            }
+            boundary->spans[block] = (ContactSpan){start, (uint32_t)count};
+            if (start + (uint64_t)count <= boundary->contact_capacity)
+                memcpy(boundary->contacts + start, scratch->contacts, (size_t)count * sizeof(Contact));
+        }
+    }
+    boundary->contact_count = used;
+    *fault = first_fault;
+    return first_fault == UINT32_MAX;
+}
+
+bool boundary_apply(Boundary *boundary, Rows *rows, const Passes *passes, const Particles *particles, int threads,
+                    Err *err) {
+    const BoundaryJob job = {.sets = {&boundary->fixed.sorted, &boundary->moving.sorted},
+                             .position = (const Float4 *)particles->position,
+                             .centres = (const Float4 *)boundary->centres,
+                             .count = particles->count,
+                             .kernel = rows->pairs.kernel,
+                             .gradient_unit = rows->pairs.gradient_unit,
+                             .density = rows->density.data,
+                             .gradient_sum = rows->gradient_sum.data,
+                             .neighbours = rows->neighbours};
+    uint32_t fault;
+    if (!apply_blocks(boundary, &job, passes, rows, threads, &fault))
+        return err_set(err, ERR_DIVERGED, "particle %llu touches more than %d walls and bodies at once",
+                       (unsigned long long)particles->id[fault], MAX_CONTACT_OBJECTS);
+    if (boundary->contact_count <= boundary->contact_capacity)
+        return true;
+    /* the terms are done, only the list was too short: make room and list the contacts alone once more */
+    boundary->contact_capacity = boundary->contact_count + boundary->contact_count / 4;
+    if (!buffer_reserve(&boundary->contact_buffer, "contacts", boundary->contact_capacity * sizeof(Contact), err))
+        return false;
+    boundary->contacts = boundary->contact_buffer.data;
+    BoundaryJob again = job;
+    again.density = NULL;
+    return apply_blocks(boundary, &again, passes, rows, threads, &fault);
+}
+
+void boundary_impulse(const Boundary *boundary, const float *p, uint32_t blocks, double (*totals)[6], int threads) {
+    const uint32_t objects = boundary->object_count;
+    double(*partials)[6] = boundary->partial_buffer.data;
+#pragma omp parallel for schedule(static) num_threads(threads)
+    for (uint32_t block = 0; block < blocks; block++) {
+        const ContactSpan span = boundary->spans[block];
+        double(*partial)[6] = partials + (size_t)block * objects;
+        if (span.count == 0)
+            continue;
+        memset(partial, 0, objects * sizeof *partial);
+        for (uint32_t c = span.start; c < span.start + span.count; c++) {
+            const Contact *contact = &boundary->contacts[c];
+            const float weight = p[contact->particle];
+            for (int k = 0; k < 3; k++) {
+                partial[contact->object][k] += (double)(weight * contact->g[k]);
+                partial[contact->object][3 + k] += (double)(weight * contact->t[k]);
+            }
+        }
+    }
+    memset(totals, 0, objects * sizeof *totals);
+    for (uint32_t block = 0; block < blocks; block++) {
+        if (boundary->spans[block].count == 0)
+            continue;
+        for (uint32_t o = 0; o < objects; o++)
+            for (int k = 0; k < 6; k++)
+                totals[o][k] += partials[(size_t)block * objects + o][k];
+    }
+}
+
+void boundary_set_free(BoundarySet *set) {
+    free(set->samples.position);
+    free(set->samples.volume);
+    free(set->samples.area);
+    free(set->samples.normal);
+    free(set->samples.object);
+    buffer_free(&set->buffer);
+    buffer_free(&set->cells);
+    buffer_free(&set->occupied);
+    *set = (BoundarySet){0};
+}
+
+void boundary_free(Boundary *boundary) {
+    boundary_set_free(&boundary->fixed);
+    boundary_set_free(&boundary->moving);
+    buffer_free(&boundary->contact_buffer);
+    buffer_free(&boundary->span_buffer);
+    buffer_free(&boundary->centre_buffer);
+    buffer_free(&boundary->partial_buffer);
+}

@@ -1,0 +1,367 @@
+/* Pressure solves: the operator, and two ways to invert it.
+ *
+ * Unknown: P_i = p_i dt^2 / rho0 >= 0 (m^2). With V gradW_ij packed in the rows, G_i = sum_j V gradW_ij + g_i, D the divergence and D^T its transpose:
+ *   velocity change  -(D^T P)_i / dt,  (D^T P)_i = P_i G_i + sum_j P_j V gradW_ij;
+ *   density change in one step, relative to rho0:  dt (D v)_i = dt (v_i . G_i - sum_j v_j . V gradW_ij - sum_b v_b . g_ib - omega_b . t_ib).
+ * A = D D^T is symmetric positive semidefinite. A body takes part as six more unknown velocities: it answers a pressure field by
+ * -(m / M) sum_i P_i g_ib and -m I^-1 sum_i P_i t_ib, which keeps A symmetric and couples light bodies without substeps.
+ *
+ * Density solve: gamma (rho / rho0 - 1) + dt D v - A P <= 0, P >= 0, and zero where P > 0. gamma < 1 corrects a density error over about 1 / gamma
+ * steps: with 1 a residual comes back doubled in the next step, once through the density and once through the velocity, and every step has to work it off
+ * again. Divergence solve: the same with dt D v alone.
+ *
+ * gcr: conjugate residuals (GCR with one direction kept) preconditioned by the diagonal, on the set where P > 0 or the residual is positive,
+ * projected to P >= 0 after each step. jacobi: relaxed Jacobi as in the papers, compression only. Both count applications of A. */
+#include "dfsph.h"
+
+#include <math.h>
+
+/* Diagonals below this belong to particles without a neighbour to push. */
+static const float MIN_DIAGONAL = 1e-6f;
+/* The divergence solve leaves out particles with fewer neighbours: spray has no divergence to speak of. */
+enum { MIN_NEIGHBOURS = 20 };
+/* The two-sided residual goes this far below the one-sided tolerance, so that the usual error, measured at the next step, keeps it. */
+static const double SAFETY = 0.3;
+
+bool dfsph_reserve(Dfsph *dfsph, uint32_t particle_capacity, uint32_t object_count, Err *err) {
+    const size_t padded = particle_capacity + BLOCK, blocks = padded / BLOCK;
+    const size_t bytes = padded * (2 * sizeof(Float4) + 6 * sizeof(float)) +
+                         blocks * DFSPH_SUMS * sizeof(double) + (size_t)object_count * 12 * sizeof(double);
+    if (!buffer_reserve(&dfsph->buffer, "pressure solver", bytes, err))
+        return false;
+    char *next = dfsph->buffer.data;
+#define TAKE(field, count)                                                                                   \
+    dfsph->field = (void *)next;                                                                             \
+    next += (count) * sizeof *dfsph->field
+    TAKE(acceleration, padded);
+    TAKE(guess, padded);
+    TAKE(partials, blocks * DFSPH_SUMS);
+    TAKE(impulses, object_count);
+    TAKE(responses, object_count);
+    TAKE(residual, padded);
+    TAKE(preconditioned, padded);
+    TAKE(direction, padded);
+    TAKE(image, padded);
+    TAKE(new_image, padded);
+    TAKE(inv_diagonal, padded);
+#undef TAKE
+    return true;
+}
+
+void dfsph_free(Dfsph *dfsph) {
+    buffer_free(&dfsph->buffer);
+}
+
+/* ---- Sums ---- */
+
+/* Sixteen running sums, added up in a fixed order: the same whatever the register width. */
+typedef struct LaneSum {
+    float lane[LANES];
+} LaneSum;
+
+static double lane_total(const LaneSum *sum) {
+    double total = 0.0;
+    for (int l = 0; l < LANES; l++)
+        total += (double)sum->lane[l];
+    return total;
+}
+
+static void total_partials(const Dfsph *dfsph, uint32_t blocks, int count, double *totals) {
+    for (int k = 0; k < count; k++)
+        totals[k] = 0.0;
+    for (uint32_t block = 0; block < blocks; block++)
+        for (int k = 0; k < count; k++)
+            totals[k] += dfsph->partials[block * DFSPH_SUMS + (uint32_t)k];
+}
+
+#define EACH_BLOCK _Pragma("omp parallel for schedule(static) num_threads(problem->threads)")                \
+    for (uint32_t block = 0; block < blocks; block++)
+#define EACH_SLICE for (uint32_t first = block * BLOCK; first < (block + 1) * BLOCK; first += SLICE)
+#define EACH_LANE for (uint32_t l = 0; l < LANES; l++)
+
+/* ---- The operator ---- */
+
+/* acceleration = D^T p for fluid and bodies. */
+static void apply_transpose(Dfsph *dfsph, const DfsphProblem *problem, const float *p) {
+    const uint32_t blocks = particles_blocks(problem->particles);
+    const PairData *pairs = &problem->rows->pairs;
+    EACH_BLOCK {
+        problem->passes->accelerate(pairs, p, dfsph->acceleration, block);
+    }
+    if (!dfsph->moving)
+        return;
+    boundary_impulse(problem->boundary, p, blocks, dfsph->impulses, problem->threads);
+    const double mass = (double)pairs->volume * (double)problem->params->rest_density;
+    for (int b = 0; b < problem->body_count; b++) {
+        const double *impulse = dfsph->impulses[1 + b];
+        double *response = dfsph->responses[1 + b];
+        matrix_times((const double(*)[3])problem->bodies[b].inv_inertia, impulse + 3, response + 3);
+        for (int k = 0; k < 3; k++) {
+            response[k] = -mass * problem->bodies[b].inv_mass[k] * impulse[k];
+            response[3 + k] *= -mass;
+        }
+    }
+}
+
+/* Takes the motion of walls and bodies out of a divergence: velocities[object] = (v, omega). */
+static void subtract_bodies(const Boundary *boundary, const double (*velocities)[6], float *result, uint32_t block) {
+    const ContactSpan span = boundary->spans[block];
+    for (uint32_t c = span.start; c < span.start + span.count; c++) {
+        const Contact *contact = &boundary->contacts[c];
+        if (contact->object == 0)
+            continue;
+        const double *v = velocities[contact->object];
+        double sum = 0.0;
+        for (int k = 0; k < 3; k++)
+            sum += v[k] * (double)contact->g[k] + v[3 + k] * (double)contact->t[k];
+        result[contact->particle] -= (float)sum;
+    }
+}
+
+static void divergence_block(const Dfsph *dfsph, const DfsphProblem *problem, const Float4 *v,
+                             const double (*velocities)[6], float *result, uint32_t block) {
+    problem->passes->divergence(&problem->rows->pairs, v, result, block);
+    if (dfsph->moving)
+        subtract_bodies(problem->boundary, velocities, result, block);
+}
+
+/* Velocity change -D^T p / dt of fluid (from `velocity` to `result`) and, if asked, of the bodies themselves. */
+static void apply_pressure(Dfsph *dfsph, const DfsphProblem *problem, const Float4 *velocity, Float4 *result) {
+    const uint32_t blocks = particles_blocks(problem->particles);
+    const float scale = 1.0f / problem->params->time_step;
+    const Float4 *acceleration = (const Float4 *)dfsph->acceleration;
+    EACH_BLOCK {
+        const uint32_t end = (block + 1) * BLOCK;
+        for (uint32_t i = block * BLOCK; i < end; i++)
+            for (int k = 0; k < 4; k++)
+                result[i][k] = velocity[i][k] - scale * acceleration[i][k];
+    }
+}
+
+/* Velocities of the bodies after the pressure so far. */
+static void body_velocities(const Dfsph *dfsph, const DfsphProblem *problem, double (*velocities)[6]) {
+    const double scale = 1.0 / (double)problem->params->time_step;
+    for (int b = 0; b < problem->body_count; b++)
+        for (int k = 0; k < 3; k++) {
+            velocities[1 + b][k] = problem->bodies[b].velocity[k] - scale * dfsph->responses[1 + b][k];
+            velocities[1 + b][3 + k] = problem->bodies[b].angular_velocity[k] - scale * dfsph->responses[1 + b][3 + k];
+        }
+}
+
+/* ---- Residuals ---- */
+
+typedef struct Errors {
+    double one_sided, two_sided;
+} Errors;
+
+static inline void error_lanes(const float *residual, const float *p, LaneSum *one, LaneSum *two) {
+    EACH_LANE {
+        const float positive = residual[l] > 0.0f ? residual[l] : 0.0f;
+        const float negative = residual[l] < 0.0f && p[l] > 0.0f ? -residual[l] : 0.0f;
+        one->lane[l] += positive;
+        two->lane[l] += positive + negative;
+    }
+}
+
+static inline void precondition_lanes(const float *residual, const float *p, const float *inv_diagonal, float *z) {
+    EACH_LANE {
+        z[l] = p[l] > 0.0f || residual[l] > 0.0f ? residual[l] * inv_diagonal[l] : 0.0f;
+    }
+}
+
+/* residual = source + dt D (v - D^T p / dt), and what follows from it. One application of A. */
+static Errors evaluate_residual(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, const float *p) {
+    const uint32_t blocks = particles_blocks(problem->particles);
+    apply_transpose(dfsph, problem, p);
+    apply_pressure(dfsph, problem, (const Float4 *)problem->particles->velocity, dfsph->guess);
+    double(*velocities)[6] = dfsph->impulses; /* no longer needed */
+    if (dfsph->moving)
+        body_velocities(dfsph, problem, velocities);
+    const float dt = problem->params->time_step;
+    const float gamma = kind == SOLVE_DENSITY ? problem->params->softening : 0.0f;
+    const float *density = problem->rows->pairs.density;
+    float *residual = dfsph->residual;
+    EACH_BLOCK {
+        divergence_block(dfsph, problem, (const Float4 *)dfsph->guess, (const double(*)[6])velocities, residual, block);
+        LaneSum one = {0}, two = {0};
+        EACH_SLICE {
+            EACH_LANE {
+                const uint32_t i = first + l;
+                const float r = gamma * (density[i] - 1.0f) + dt * residual[i];
+                residual[i] = dfsph->inv_diagonal[i] > 0.0f ? r : 0.0f;
+            }
+            error_lanes(residual + first, p + first, &one, &two);
+            precondition_lanes(residual + first, p + first, dfsph->inv_diagonal + first, dfsph->preconditioned + first);
+        }
+        dfsph->partials[block * DFSPH_SUMS] = lane_total(&one);
+        dfsph->partials[block * DFSPH_SUMS + 1] = lane_total(&two);
+    }
+    double totals[2];
+    total_partials(dfsph, blocks, 2, totals);
+    return (Errors){totals[0] / problem->particles->count, totals[1] / problem->particles->count};
+}
+
+/* Inverse diagonal, 0 where a particle takes no part; pressure scaled to the warm start. */
+static void prepare(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, float *p) {
+    const uint32_t blocks = particles_blocks(problem->particles);
+    const uint32_t count = problem->particles->count;
+    const float warm = kind == SOLVE_DENSITY ? problem->params->warm_start : problem->params->warm_start_divergence;
+    const Float4 *gradient_sum = problem->rows->pairs.gradient_sum;
+    EACH_BLOCK {
+        for (uint32_t i = block * BLOCK; i < (block + 1) * BLOCK; i++) {
+            const bool few = kind == SOLVE_DIVERGENCE && problem->rows->neighbours[i] < MIN_NEIGHBOURS;
+            const bool takes_part = i < count && gradient_sum[i][3] > MIN_DIAGONAL && !few;
+            dfsph->inv_diagonal[i] = takes_part ? 1.0f / gradient_sum[i][3] : 0.0f;
+            p[i] = takes_part && p[i] > 0.0f ? warm * p[i] : 0.0f;
+        }
+    }
+}
+
+/* ---- Conjugate residuals ---- */
+
+typedef struct GcrSums {
+    double old_new, new_new, old_old, residual_new, residual_old;
+} GcrSums;
+
+/* new_image = A preconditioned, and the dot products a step needs, weighted by the inverse diagonal over the active set. */
+static GcrSums gcr_apply(Dfsph *dfsph, const DfsphProblem *problem, const float *p) {
+    const uint32_t blocks = particles_blocks(problem->particles);
+    apply_transpose(dfsph, problem, dfsph->preconditioned);
+    EACH_BLOCK {
+        divergence_block(dfsph, problem, (const Float4 *)dfsph->acceleration, (const double(*)[6])dfsph->responses,
+                         dfsph->new_image, block);
+        LaneSum sums[5] = {0};
+        EACH_SLICE {
+            const float *r = dfsph->residual + first, *q = dfsph->image + first, *w = dfsph->new_image + first;
+            const float *inv = dfsph->inv_diagonal + first, *pressure = p + first;
+            EACH_LANE {
+                const float weight = pressure[l] > 0.0f || r[l] > 0.0f ? inv[l] : 0.0f;
+                const float wq = weight * q[l], ww = weight * w[l];
+                sums[0].lane[l] += wq * w[l];
+                sums[1].lane[l] += ww * w[l];
+                sums[2].lane[l] += wq * q[l];
+                sums[3].lane[l] += ww * r[l];
+                sums[4].lane[l] += wq * r[l];
+            }
+        }
+        for (int k = 0; k < 5; k++)
+            dfsph->partials[block * DFSPH_SUMS + (uint32_t)k] = lane_total(&sums[k]);
+    }
+    double t[5];
+    total_partials(dfsph, blocks, 5, t);
+    return (GcrSums){t[0], t[1], t[2], t[3], t[4]};
+}
+
+/* One step along the new direction: d = z - beta d, q = A d, P = max(0, P + alpha d). Returns what the projection cut, weighted by the diagonal. */
+static double gcr_update(Dfsph *dfsph, const DfsphProblem *problem, float *p, float alpha, float beta, Errors *errors) {
+    const uint32_t blocks = particles_blocks(problem->particles);
+    EACH_BLOCK {
+        LaneSum one = {0}, two = {0}, cut = {0};
+        EACH_SLICE {
+            float *r = dfsph->residual + first, *q = dfsph->image + first, *d = dfsph->direction + first;
+            float *z = dfsph->preconditioned + first, *pressure = p + first;
+            const float *w = dfsph->new_image + first, *inv = dfsph->inv_diagonal + first;
+            EACH_LANE {
+                d[l] = z[l] - beta * d[l];
+                q[l] = w[l] - beta * q[l];
+                const float next = pressure[l] + alpha * d[l];
+                cut.lane[l] += next < 0.0f ? -next / inv[l] : 0.0f;
+                pressure[l] = next < 0.0f ? 0.0f : next;
+                r[l] = inv[l] > 0.0f ? r[l] - alpha * q[l] : 0.0f;
+            }
+            error_lanes(r, pressure, &one, &two);
+            precondition_lanes(r, pressure, inv, z);
+        }
+        dfsph->partials[block * DFSPH_SUMS] = lane_total(&one);
+        dfsph->partials[block * DFSPH_SUMS + 1] = lane_total(&two);
+        dfsph->partials[block * DFSPH_SUMS + 2] = lane_total(&cut);
+    }
+    double totals[3];
+    total_partials(dfsph, blocks, 3, totals);
+    const double count = problem->particles->count;
+    *errors = (Errors){totals[0] / count, totals[1] / count};
+    return totals[2] / count;
+}
+
+typedef struct SolveLimits {
+    double tolerance; /* relative density */
+    int min, max;
+} SolveLimits;
+
+static SolveResult solve_gcr(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, float *p, SolveLimits limits) {
+    const double tolerance = SAFETY * limits.tolerance;
+    Errors errors = evaluate_residual(dfsph, problem, kind, p);
+    int iterations = 1;
+    bool has_direction = false;
+    double cut = 0.0;
+    while (!(errors.two_sided <= tolerance && iterations >= limits.min) && iterations < limits.max) {
+        const GcrSums sums = gcr_apply(dfsph, problem, p);
+        iterations++;
+        const double beta = has_direction && sums.old_old > 0.0 ? sums.old_new / sums.old_old : 0.0;
+        const double image_sq = sums.new_new - 2.0 * beta * sums.old_new + beta * beta * sums.old_old;
+        const double along = sums.residual_new - beta * sums.residual_old;
+        const double alpha = image_sq > 0.0 ? along / image_sq : 0.0;
+        has_direction = alpha > 0.0;
+        cut += gcr_update(dfsph, problem, p, (float)(has_direction ? alpha : 0.0), (float)beta, &errors);
+        if (!has_direction && beta == 0.0)
+            break; /* the residual has nothing left along any direction */
+        if (cut > 0.1 * tolerance && iterations < limits.max) {
+            /* the projection moved P without the residual knowing */
+            errors = evaluate_residual(dfsph, problem, kind, p);
+            iterations++;
+            has_direction = false;
+            cut = 0.0;
+        }
+    }
+    return (SolveResult){iterations, errors.one_sided, errors.two_sided};
+}
+
+/* ---- Relaxed Jacobi ---- */
+
+static SolveResult solve_jacobi(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, float *p,
+                                SolveLimits limits) {
+    const uint32_t blocks = particles_blocks(problem->particles);
+    const float relaxation = problem->params->jacobi_relaxation;
+    for (int iterations = 1;; iterations++) {
+        const Errors errors = evaluate_residual(dfsph, problem, kind, p);
+        EACH_BLOCK {
+            const uint32_t end = (block + 1) * BLOCK;
+            for (uint32_t i = block * BLOCK; i < end; i++) {
+                const float next = p[i] + relaxation * dfsph->residual[i] * dfsph->inv_diagonal[i];
+                p[i] = next > 0.0f ? next : 0.0f;
+            }
+        }
+        if ((errors.one_sided <= limits.tolerance && iterations >= limits.min) || iterations >= limits.max)
+            return (SolveResult){iterations, errors.one_sided, errors.two_sided};
+    }
+}
+
+/* ---- The solve ---- */
+
+SolveResult dfsph_solve(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind) {
+    const SkiffParams *params = problem->params;
+    if (problem->particles->count == 0)
+        return (SolveResult){0};
+    float *p = kind == SOLVE_DENSITY ? problem->particles->pressure : problem->particles->pressure_divergence;
+    const SolveLimits limits =
+        kind == SOLVE_DENSITY
+            ? (SolveLimits){(double)params->max_density_error / 100.0, params->min_iterations, params->max_iterations}
+            : (SolveLimits){(double)params->max_divergence_error / 100.0, params->min_divergence_iterations,
+                            params->max_divergence_iterations};
+    dfsph->moving = problem->boundary->moving.samples.count != 0;
+    prepare(dfsph, problem, kind, p);
+    const SolveResult result = params->pressure_solver == 0 ? solve_gcr(dfsph, problem, kind, p, limits)
+                                                            : solve_jacobi(dfsph, problem, kind, p, limits);
+    apply_transpose(dfsph, problem, p);
+    Float4 *velocity = problem->particles->velocity;
+    apply_pressure(dfsph, problem, (const Float4 *)velocity, velocity);
+    if (dfsph->moving) {
+        const double scale = 1.0 / (double)params->time_step;
+        for (int b = 0; b < problem->body_count; b++)
+            for (int k = 0; k < 3; k++) {
+                problem->bodies[b].velocity[k] -= scale * dfsph->responses[1 + b][k];
+                problem->bodies[b].angular_velocity[k] -= scale * dfsph->responses[1 + b][3 + k];
+            }
+    }
+    return result;
+}

@@ -1,0 +1,48 @@
+/* The pressure solves of DFSPH [Bender & Koschier 2017; Carensac2023 appendix A]: which pressures keep the density, and the velocity's divergence,
+ * where they should be. */
+#ifndef SKIFF_DFSPH_H
+#define SKIFF_DFSPH_H
+
+#include "boundary.h"
+
+typedef enum SolveKind { SOLVE_DIVERGENCE, SOLVE_DENSITY } SolveKind;
+
+typedef struct SolveResult {
+    int iterations;        /* applications of the operator, the one for the warm start included */
+    double error;          /* mean over all particles of max(0, residual), relative density */
+    double residual;       /* mean two-sided residual: |r| where there is pressure, max(0, r) elsewhere */
+} SolveResult;
+
+typedef struct Dfsph {
+    Float4 *acceleration; /* D^T p */
+    Float4 *guess;        /* velocity after the pressure so far */
+    float *residual, *preconditioned, *direction, *image, *new_image, *inv_diagonal;
+    double *partials;     /* [blocks][DFSPH_SUMS] */
+    double (*impulses)[6]; /* [objects] sums of boundary_impulse */
+    double (*responses)[6]; /* [objects] a body's answer: (D^T p) of its six velocities */
+    bool moving;          /* any object has a velocity or may get one */
+    Buffer buffer;
+} Dfsph;
+
+enum { DFSPH_SUMS = 6 };
+
+/* What the solves work on. */
+typedef struct DfsphProblem {
+    const SkiffParams *params;
+    const Passes *passes;
+    Rows *rows;
+    Boundary *boundary;
+    Body *bodies;
+    int body_count;
+    Particles *particles;
+    int threads;
+} DfsphProblem;
+
+bool dfsph_reserve(Dfsph *dfsph, uint32_t particle_capacity, uint32_t object_count, Err *err);
+void dfsph_free(Dfsph *dfsph);
+
+/* Solves for the pressure field of `kind` (particles->pressure or pressure_divergence, warm start in, result out) and changes the velocities of
+ * fluid and bodies by it. */
+SolveResult dfsph_solve(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind);
+
+#endif

@@ -1,0 +1,176 @@
+/* Counting sort of the particles by cell. Each thread counts and later moves one contiguous part of the particles, and the parts are taken in
+ * order within a cell, so the sort is stable and its result does not depend on the number of threads. */
+#include "grid.h"
+
+#include <math.h>
+#include <omp.h>
+
+enum { MAX_PARTS = 8 };
+
+static void grid_bounds(const Particles *particles, GridBounds *bounds, int threads) {
+    float min_x = INFINITY, min_y = INFINITY, min_z = INFINITY, max_x = -INFINITY, max_y = -INFINITY,
+          max_z = -INFINITY;
+#pragma omp parallel for schedule(static) num_threads(threads) reduction(min : min_x, min_y, min_z)           \
+    reduction(max : max_x, max_y, max_z)
+    for (uint32_t i = 0; i < particles->count; i++) {
+        const float *p = particles->position[i];
+        min_x = fminf(min_x, p[0]);
+        min_y = fminf(min_y, p[1]);
+        min_z = fminf(min_z, p[2]);
+        max_x = fmaxf(max_x, p[0]);
+        max_y = fmaxf(max_y, p[1]);
+        max_z = fmaxf(max_z, p[2]);
+    }
+    *bounds = (GridBounds){{min_x, min_y, min_z}, {max_x, max_y, max_z}};
+}
+
+bool grid_layout(CellGrid *cells, const GridBounds *bounds, float cell_size, int margin) {
+    double total = 1.0;
+    for (int k = 0; k < 3; k++) {
+        /* origins on multiples of the cell size: a particle changes cell only when it moves, not when the bounds do */
+        const double low = floor((double)bounds->min[k] / cell_size) - margin;
+        const double high = floor((double)bounds->max[k] / cell_size) + margin;
+        if (!(high - low < (double)GRID_MAX_CELLS))
+            return false;
+        cells->origin[k] = (float)(low * cell_size);
+        /* one more for rounding between the origin and the bounds */
+        cells->size[k] = (int32_t)(high - low) + 2;
+        total *= cells->size[k];
+    }
+    cells->inv_size = 1.0f / cell_size;
+    return total <= GRID_MAX_CELLS;
+}
+
+static bool inside(const float *p, const GridBounds *domain) {
+    for (int k = 0; k < 3; k++)
+        if (!(p[k] >= domain->min[k] && p[k] <= domain->max[k]))
+            return false;
+    return true;
+}
+
+/* Clips the bounds to the domain; particles outside go to one extra cell at the end. */
+static uint32_t count_outside(const Particles *particles, const GridBounds *domain, uint32_t *first) {
+    uint32_t outside = 0;
+    *first = UINT32_MAX;
+    for (uint32_t i = 0; i < particles->count; i++) {
+        if (!inside(particles->position[i], domain)) {
+            *first = *first == UINT32_MAX ? i : *first;
+            outside++;
+        }
+    }
+    return outside;
+}
+
+static bool grid_reserve(Grid *grid, const Particles *particles, size_t cells, int parts, Err *err) {
+    const size_t padded = particles->capacity + SLICE;
+    /* a third more than asked, so that slowly growing bounds do not allocate in every step */
+    const size_t table = (cells + 2) * sizeof(uint32_t);
+    if (grid->start_buffer.size < table && !buffer_reserve(&grid->start_buffer, "cell starts", table + table / 3, err))
+        return false;
+    const size_t histograms = (size_t)parts * (cells + 2) * sizeof(uint32_t);
+    if (grid->histogram_buffer.size < histograms &&
+        !buffer_reserve(&grid->histogram_buffer, "cell histograms", histograms + histograms / 3, err))
+        return false;
+    if (!buffer_reserve(&grid->cell_buffer, "cells of particles", padded * sizeof(uint32_t), err) ||
+        !buffer_reserve(&grid->unsorted_buffer, "cells before the sort", padded * sizeof(uint32_t), err) ||
+        !buffer_reserve(&grid->order_buffer, "sort order", padded * sizeof(uint32_t), err))
+        return false;
+    grid->cell = grid->cell_buffer.data;
+    grid->order = grid->order_buffer.data;
+    grid->cells.start = grid->start_buffer.data;
+    return true;
+}
+
+/* Fills cell, order and the starts; `outside` particles go to the cell after the last. */
+static void counting_sort(Grid *grid, const Particles *particles, const GridBounds *domain, bool check, int parts) {
+    const CellGrid *cells = &grid->cells;
+    const uint32_t cell_count = (uint32_t)(cells->size[0] * cells->size[1] * cells->size[2]);
+    uint32_t *unsorted = grid->unsorted_buffer.data, *histograms = grid->histogram_buffer.data;
+    uint32_t *start = grid->start_buffer.data;
+    const uint32_t n = particles->count;
+#pragma omp parallel num_threads(parts)
+    {
+        /* fewer threads than asked for is possible: the parts are dealt out, not the threads assumed */
+        for (int part = omp_get_thread_num(); part < parts; part += omp_get_num_threads()) {
+            uint32_t *histogram = histograms + (size_t)part * (cell_count + 1);
+            memset(histogram, 0, (cell_count + 1) * sizeof(uint32_t));
+            const uint32_t end = (uint32_t)((uint64_t)n * (part + 1) / parts);
+            for (uint32_t i = (uint32_t)((uint64_t)n * part / parts); i < end; i++) {
+                const float *p = particles->position[i];
+                unsorted[i] = check && !inside(p, domain) ? cell_count : grid_cell_of(cells, p);
+                histogram[unsorted[i]]++;
+            }
+        }
+#pragma omp barrier
+#pragma omp single
+        {
+            uint32_t total = 0;
+            for (uint32_t c = 0; c <= cell_count; c++) {
+                start[c] = total;
+                for (int part = 0; part < parts; part++) {
+                    uint32_t *entry = &histograms[(size_t)part * (cell_count + 1) + c];
+                    const uint32_t here = *entry;
+                    *entry = total;
+                    total += here;
+                }
+            }
+            start[cell_count + 1] = total;
+        }
+        for (int part = omp_get_thread_num(); part < parts; part += omp_get_num_threads()) {
+            uint32_t *histogram = histograms + (size_t)part * (cell_count + 1);
+            const uint32_t end = (uint32_t)((uint64_t)n * (part + 1) / parts);
+            for (uint32_t i = (uint32_t)((uint64_t)n * part / parts); i < end; i++) {
+                const uint32_t k = histogram[unsorted[i]]++;
+                grid->order[k] = i;
+                grid->cell[k] = unsorted[i];
+            }
+        }
+    }
+}
+
+bool grid_sort(Grid *grid, Particles *particles, float cell_size, const GridBounds *domain, uint32_t *removed,
+               int threads, Err *err) {
+    GridBounds bounds;
+    grid_bounds(particles, &bounds, threads);
+    if (particles->count == 0)
+        bounds = (GridBounds){{0}, {0}};
+    uint32_t outside = 0;
+    if (!inside(bounds.min, domain) || !inside(bounds.max, domain)) {
+        uint32_t first;
+        outside = count_outside(particles, domain, &first);
+        if (removed == NULL) {
+            const float *p = particles->position[first];
+            return err_set(err, ERR_DIVERGED,
+                           "particle %llu left the domain: it is at (%g, %g, %g) m (window-local), the domain is "
+                           "(%g, %g, %g) to (%g, %g, %g) m; %u particles in all are outside",
+                           (unsigned long long)particles->id[first], (double)p[0], (double)p[1], (double)p[2],
+                           (double)domain->min[0], (double)domain->min[1], (double)domain->min[2],
+                           (double)domain->max[0], (double)domain->max[1], (double)domain->max[2], outside);
+        }
+        for (int k = 0; k < 3; k++) {
+            bounds.min[k] = fminf(fmaxf(bounds.min[k], domain->min[k]), domain->max[k]);
+            bounds.max[k] = fmaxf(fminf(bounds.max[k], domain->max[k]), domain->min[k]);
+        }
+    }
+    if (!grid_layout(&grid->cells, &bounds, cell_size, 1))
+        return err_set(err, ERR_DIVERGED, "the fluid spreads over more than %d cells of %g m", GRID_MAX_CELLS,
+                       (double)cell_size);
+    const size_t cells = (size_t)grid->cells.size[0] * (size_t)grid->cells.size[1] * (size_t)grid->cells.size[2];
+    const int parts = threads < MAX_PARTS ? threads : MAX_PARTS;
+    if (!grid_reserve(grid, particles, cells, parts, err))
+        return false;
+    counting_sort(grid, particles, domain, outside != 0, parts);
+    if (removed != NULL)
+        *removed = outside;
+    particles_permute(particles, grid->order, particles->count - outside, threads);
+    return true;
+}
+
+void grid_free(Grid *grid) {
+    buffer_free(&grid->start_buffer);
+    buffer_free(&grid->cell_buffer);
+    buffer_free(&grid->order_buffer);
+    buffer_free(&grid->unsorted_buffer);
+    buffer_free(&grid->histogram_buffer);
+    *grid = (Grid){0};
+}

@@ -1,0 +1,36 @@
+/* Cells of edge h over the fluid, and the stable sort of the particles into them. */
+#ifndef SKIFF_GRID_H
+#define SKIFF_GRID_H
+
+#include "particles.h"
+
+typedef struct Grid {
+    CellGrid cells;
+    uint32_t *cell;  /* [particles] cell of every particle, after the sort */
+    uint32_t *order; /* [particles] scratch: the permutation */
+    Buffer start_buffer, cell_buffer, order_buffer, unsorted_buffer, histogram_buffer;
+} Grid;
+
+typedef struct GridBounds {
+    float min[3], max[3];
+} GridBounds;
+
+enum { GRID_MAX_CELLS = 1 << 27 };
+
+/* Sorts the particles by cell, stably; those outside `domain` are removed and counted in *removed, or are an error when `removed` is NULL
+ * (ERR_DIVERGED naming the particle). Cells come from the particles' own bounds, so an empty sky costs nothing. */
+bool grid_sort(Grid *grid, Particles *particles, float cell_size, const GridBounds *domain, uint32_t *removed,
+               int threads, Err *err);
+void grid_free(Grid *grid);
+
+/* Cell table over given bounds: origin and size set, one empty layer around (`margin` layers). False when it would have more than GRID_MAX_CELLS. */
+bool grid_layout(CellGrid *cells, const GridBounds *bounds, float cell_size, int margin);
+
+static inline uint32_t grid_cell_of(const CellGrid *cells, const float *p) {
+    int32_t c[3];
+    for (int k = 0; k < 3; k++)
+        c[k] = (int32_t)((p[k] - cells->origin[k]) * cells->inv_size);
+    return (uint32_t)cell_grid_index(cells, c[0], c[1], c[2]);
+}
+
+#endif

@@ -1,0 +1,143 @@
+/* The parameter table made into data, and the defaults of every def. */
+#include "skiff.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+static const SkiffParamInfo infos[] = {
+#define PARAM_FLOAT(field, key, value, min, max, unit, help)                                                 \
+    {key, SKIFF_FLOAT, offsetof(SkiffParams, field), {value}, min, max, unit, NULL, help},
+#define PARAM_INT(field, key, value, min, max, unit, help)                                                   \
+    {key, SKIFF_INT, offsetof(SkiffParams, field), {value}, min, max, unit, NULL, help},
+#define PARAM_BOOL(field, key, value, help)                                                                  \
+    {key, SKIFF_BOOL, offsetof(SkiffParams, field), {value}, 0, 1, "", NULL, help},
+#define PARAM_VEC3(field, key, x, y, z, min, max, unit, help)                                                \
+    {key, SKIFF_VEC3, offsetof(SkiffParams, field), {x, y, z}, min, max, unit, NULL, help},
+#define PARAM_ENUM(field, key, value, names, help)                                                           \
+    {key, SKIFF_ENUM, offsetof(SkiffParams, field), {value}, 0, 0, "", names, help},
+#include "params.inl"
+#undef PARAM_FLOAT
+#undef PARAM_INT
+#undef PARAM_BOOL
+#undef PARAM_VEC3
+#undef PARAM_ENUM
+};
+
+enum { INFO_COUNT = sizeof infos / sizeof infos[0] };
+
+const SkiffParamInfo *skiff_param_infos(int *count) {
+    *count = INFO_COUNT;
+    return infos;
+}
+
+static int enum_count(const char *names) {
+    int count = 1;
+    for (; *names != '\0'; names++)
+        count += *names == '|';
+    return count;
+}
+
+/* Largest and smallest component of the field; NaN if any is. */
+static void param_extremes(const SkiffParamInfo *info, const void *field, double *low, double *high) {
+    switch (info->type) {
+    case SKIFF_FLOAT:
+        *low = *high = *(const float *)field;
+        break;
+    case SKIFF_INT:
+    case SKIFF_ENUM:
+        *low = *high = *(const int *)field;
+        break;
+    case SKIFF_BOOL: /* both values are in range */
+        break;
+    case SKIFF_VEC3: {
+        const float *v = field;
+        *low = *high = v[0];
+        for (int k = 1; k < 3; k++) {
+            *low = v[k] < *low || isnan(v[k]) ? v[k] : *low;
+            *high = v[k] > *high || isnan(v[k]) ? v[k] : *high;
+        }
+        break;
+    }
+    }
+}
+
+bool skiff_params_check(const SkiffParams *params, Err *err) {
+    bool good = true;
+    for (int k = 0; k < INFO_COUNT; k++) {
+        const SkiffParamInfo *info = &infos[k];
+        double low = 0.0, high = 0.0;
+        param_extremes(info, (const char *)params + info->offset, &low, &high);
+        const double max = info->type == SKIFF_ENUM ? enum_count(info->names) - 1 : info->max;
+        /* float fields are compared with float limits: 0.1f is above 0.1 */
+        if ((float)low >= (float)info->min && (float)high <= (float)max)
+            continue;
+        const double bad = (float)low >= (float)info->min ? high : low;
+        good = err_add(err, ERR_INPUT, "Configuration.%s: %g is out of range, allowed is %g to %g%s%s", info->key, bad,
+                       info->min, max, info->unit[0] ? " " : "", info->unit);
+    }
+    return good;
+}
+
+SkiffDef skiff_def_default(void) {
+    SkiffDef def;
+    memset(&def, 0, sizeof def);
+    for (int k = 0; k < INFO_COUNT; k++) {
+        void *field = (char *)&def.params + infos[k].offset;
+        switch (infos[k].type) {
+        case SKIFF_FLOAT:
+            *(float *)field = (float)infos[k].defaults[0];
+            break;
+        case SKIFF_INT:
+        case SKIFF_ENUM:
+            *(int *)field = (int)infos[k].defaults[0];
+            break;
+        case SKIFF_BOOL:
+            *(bool *)field = infos[k].defaults[0] != 0.0;
+            break;
+        case SKIFF_VEC3:
+            for (int a = 0; a < 3; a++)
+                ((float *)field)[a] = (float)infos[k].defaults[a];
+            break;
+        }
+    }
+    def.tank.geometry = skiff_geometry_default();
+    def.tank.open = true;
+    def.tank.wet_height = INFINITY;
+    return def;
+}
+
+SkiffGeometryDef skiff_geometry_default(void) {
+    return (SkiffGeometryDef){.size = {1, 1, 1}, .radius = 1, .scale = {1, 1, 1}, .rotation_axis = {0, 1, 0}};
+}
+
+SkiffBlockDef skiff_block_default(void) {
+    return (SkiffBlockDef){.repeat = 1, .period = 1.0};
+}
+
+SkiffBodyDef skiff_body_default(void) {
+    return (SkiffBodyDef){.geometry = skiff_geometry_default(), .density = 1000.0f, .free_axes = SKIFF_FREE_ALL};
+}
+
+SkiffProbeDef skiff_probe_default(void) {
+    return (SkiffProbeDef){.kind = SKIFF_PROBE_HEIGHT};
+}
+
+const char *skiff_simd_name(SkiffSimd simd) {
+    static const char *const names[] = {"auto", "plain", "avx2", "avx512"};
+    return names[simd];
+}
+
+#define PHASE(id, key, label) [SKIFF_PHASE_##id] = {key, label},
+static const char *const phase_texts[SKIFF_PHASE_COUNT][2] = {
+#include "phases.inl"
+};
+#undef PHASE
+
+const char *skiff_phase_key(int phase) {
+    return phase_texts[phase][0];
+}
+
+const char *skiff_phase_label(int phase) {
+    return phase_texts[phase][1];
+}

@@ -1,0 +1,97 @@
+/* Storage of the fluid's particles and the permutation that sorting needs. */
+#include "particles.h"
+
+#include <assert.h>
+
+const ParticleFieldInfo particle_fields[PARTICLE_FIELD_COUNT] = {
+#define PARTICLE_FIELD(field, type, components, state)                                                       \
+    [PARTICLE_##field] = {#field, state, components, (uint32_t)sizeof(type) * (components)},
+#include "particles.inl"
+#undef PARTICLE_FIELD
+};
+
+static void particles_bind(Particles *particles) {
+#define PARTICLE_FIELD(field, type, components, state)                                                       \
+    particles->field = particles->front[PARTICLE_##field].data;
+#include "particles.inl"
+#undef PARTICLE_FIELD
+}
+
+bool particles_reserve(Particles *particles, uint32_t capacity, Err *err) {
+    /* one slice beyond the last block: sixteen-wide loads may begin at the last particle */
+    const uint32_t padded = (capacity + BLOCK - 1) / BLOCK * BLOCK;
+    for (int f = 0; f < PARTICLE_FIELD_COUNT; f++) {
+        const size_t size = (size_t)(padded + SLICE) * particle_fields[f].size;
+        if (!buffer_reserve(&particles->front[f], particle_fields[f].name, size, err) ||
+            !buffer_reserve(&particles->back[f], particle_fields[f].name, size, err))
+            return false;
+    }
+    if (padded > particles->capacity)
+        particles->capacity = padded;
+    particles_bind(particles);
+    return true;
+}
+
+void particles_free(Particles *particles) {
+    for (int f = 0; f < PARTICLE_FIELD_COUNT; f++) {
+        buffer_free(&particles->front[f]);
+        buffer_free(&particles->back[f]);
+    }
+    *particles = (Particles){0};
+}
+
+void *particles_data(Particles *particles, ParticleFieldId field) {
+    return particles->front[field].data;
+}
+
+static void permute_field(const ParticleFieldInfo *info, const void *from, void *to, const uint32_t *order,
+                          uint32_t begin, uint32_t end) {
+    switch (info->size) {
+    case 4:
+        for (uint32_t k = begin; k < end; k++)
+            ((uint32_t *)to)[k] = ((const uint32_t *)from)[order[k]];
+        break;
+    case 8:
+        for (uint32_t k = begin; k < end; k++)
+            ((uint64_t *)to)[k] = ((const uint64_t *)from)[order[k]];
+        break;
+    default:
+        for (uint32_t k = begin; k < end; k++)
+            memcpy((char *)to + (size_t)k * info->size, (const char *)from + (size_t)order[k] * info->size,
+                   info->size);
+    }
+}
+
+void particles_permute(Particles *particles, const uint32_t *order, uint32_t count, int threads) {
+    assert(count <= particles->capacity);
+    const uint32_t blocks = (count + BLOCK - 1) / BLOCK;
+#pragma omp parallel for schedule(static) num_threads(threads)
+    for (uint32_t block = 0; block < blocks; block++) {
+        const uint32_t begin = block * BLOCK, end = begin + BLOCK < count ? begin + BLOCK : count;
+        for (int f = 0; f < PARTICLE_FIELD_COUNT; f++)
+            permute_field(&particle_fields[f], particles->front[f].data, particles->back[f].data, order, begin, end);
+    }
+    for (int f = 0; f < PARTICLE_FIELD_COUNT; f++) {
+        const size_t size = particle_fields[f].size;
+        memset((char *)particles->back[f].data + count * size, 0, ((size_t)blocks * BLOCK + SLICE - count) * size);
+        const Buffer swap = particles->front[f];
+        particles->front[f] = particles->back[f];
+        particles->back[f] = swap;
+    }
+    particles->count = count;
+    particles_bind(particles);
+}
+
+uint32_t particles_append(Particles *particles, const float position[3], const float velocity[3], double birth) {
+    assert(particles->count < particles->capacity);
+    const uint32_t i = particles->count++;
+    for (int k = 0; k < 3; k++) {
+        particles->position[i][k] = position[k];
+        particles->velocity[i][k] = velocity[k];
+    }
+    particles->position[i][3] = particles->velocity[i][3] = 0.0f;
+    particles->pressure[i] = particles->pressure_divergence[i] = 0.0f;
+    particles->id[i] = particles->next_id++;
+    particles->birth[i] = birth;
+    return i;
+}

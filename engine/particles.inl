@@ -1,0 +1,8 @@
+/* What a fluid particle carries from step to step, once: the sort permutes it, states save it, the hash covers it.
+ * PARTICLE_FIELD(field, scalar type, scalars, state type) */
+PARTICLE_FIELD(position, float, 4, STATE_F32)            /* m, window-local; [3] unused, 0 */
+PARTICLE_FIELD(velocity, float, 4, STATE_F32)            /* m/s; [3] unused, 0 */
+PARTICLE_FIELD(pressure, float, 1, STATE_F32)            /* p dt^2 / rho0 of the density solve, m^2: its warm start */
+PARTICLE_FIELD(pressure_divergence, float, 1, STATE_F32) /* the same of the divergence solve */
+PARTICLE_FIELD(id, uint64_t, 1, STATE_U64)               /* never reused */
+PARTICLE_FIELD(birth, double, 1, STATE_F64)              /* s */

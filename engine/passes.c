@@ -1,0 +1,437 @@
+/* The pair loops, compiled once per instruction set (PASSES_ISA is plain, avx2 or avx512; see passes.h for the ideas).
+ *
+ * A particle is a lane: sixteen particles advance together through their k-th neighbours. Every sum is thereby taken over the
+ * neighbours in row order with one fused multiply-add each, whatever the register width, and no horizontal sum is needed. */
+
+#define PASSES_AVX512 1
+#define PASSES_AVX2 2
+#define PASSES_PLAIN 3
+#define PASSES_avx512 PASSES_AVX512
+#define PASSES_avx2 PASSES_AVX2
+#define PASSES_plain PASSES_PLAIN
+#define PASSES_JOIN_(a, b) a##b
+#define PASSES_JOIN(a, b) PASSES_JOIN_(a, b)
+#if PASSES_JOIN(PASSES_, PASSES_ISA) == PASSES_AVX512
+#define SIMD_AVX512
+#elif PASSES_JOIN(PASSES_, PASSES_ISA) == PASSES_AVX2
+#define SIMD_AVX2
+#endif
+#define PASSES_TEXT_(a) #a
+#define PASSES_TEXT(a) PASSES_TEXT_(a)
+
+#include "passes.h"
+
+/* |V grad W| of a pair is at most one third of V l: see kernel.h. */
+static const float GRADIENT_STEPS = 3.0f * 32767.0f;
+
+/* V grad W in units of the fixed-point step, as a factor of x_i - x_j, and W. */
+static inline void pair_kernel(const Kernel *kernel, Vf distance_sq, Vf *factor, Vf *weight) {
+    const Vf inv_r = vf_rsqrt(distance_sq);
+    const Vf q = vf_mul(vf_mul(distance_sq, inv_r), vf_set(kernel->inv_support));
+    const Vf p = vf_sub(vf_set(1.0f), q);
+    const Vm far = vf_less(vf_set(0.5f), q);
+    const Vf near_factor =
+        vf_mul(vf_set(GRADIENT_STEPS * kernel->inv_support), vf_fma(vf_set(3.0f), q, vf_set(-2.0f)));
+    const Vf far_factor = vf_mul(vf_mul(vf_set(-GRADIENT_STEPS), vf_mul(p, p)), inv_r);
+    *factor = vf_select(far, far_factor, near_factor);
+    const Vf near_weight = vf_fma(vf_mul(vf_set(-6.0f), vf_mul(q, q)), p, vf_set(1.0f));
+    const Vf far_weight = vf_mul(vf_mul(p, p), vf_add(p, p));
+    *weight = vf_mul(vf_set(kernel->w_scale), vf_select(far, far_weight, near_weight));
+}
+
+/* ---- Neighbour search ---- */
+
+typedef struct Candidates {
+    int count;
+    int self_shift; /* place of particle i of the centre column's run is i + self_shift */
+} Candidates;
+
+/* Copies the particles of the 27 cells around `cell` into scratch, run by run. */
+static bool gather_candidates(const SearchJob *job, uint32_t cell, Scratch *scratch, Candidates *candidates) {
+    const CellGrid *grid = job->grid;
+    const int32_t column = grid->size[1], slab = grid->size[1] * grid->size[2];
+    int n = 0;
+    for (int dx = -1; dx <= 1; dx++) {
+        for (int dz = -1; dz <= 1; dz++) {
+            const int64_t middle = (int64_t)cell + dx * slab + dz * column;
+            const uint32_t begin = grid->start[middle - 1], end = grid->start[middle + 2];
+            if (n + (int64_t)(end - begin) > MAX_CANDIDATES)
+                return false;
+            if (dx == 0 && dz == 0)
+                candidates->self_shift = n - (int)begin;
+            for (uint32_t j = begin; j < end; j += LANES) {
+                Vf x, y, z, unused;
+                vf_load4(job->position + j, &x, &y, &z, &unused);
+                const int to = n + (int)(j - begin);
+                vf_store(scratch->x + to, x);
+                vf_store(scratch->y + to, y);
+                vf_store(scratch->z + to, z);
+                vi_store(scratch->index + to, vi_add(vi_set((int32_t)j), vi_lane()));
+            }
+            n += (int)(end - begin);
+        }
+    }
+    candidates->count = n;
+    return true;
+}
+
+/* Neighbours of particle i in the order of the candidates; -1 when there are too many. */
+static int find_neighbours(const SearchJob *job, const Candidates *candidates, uint32_t i, const Scratch *scratch,
+                           int32_t *list) {
+    const Vf x = vf_set(job->position[i][0]), y = vf_set(job->position[i][1]), z = vf_set(job->position[i][2]);
+    const Vf limit = vf_set(job->kernel.support * job->kernel.support);
+    const int self = (int)i + candidates->self_shift;
+    int n = 0;
+    for (int c = 0; c < candidates->count; c += LANES) {
+        const Vf dx = vf_sub(x, vf_load(scratch->x + c));
+        const Vf dy = vf_sub(y, vf_load(scratch->y + c));
+        const Vf dz = vf_sub(z, vf_load(scratch->z + c));
+        const Vf distance_sq = vf_fma(dx, dx, vf_fma(dy, dy, vf_mul(dz, dz)));
+        uint32_t valid = candidates->count - c >= LANES ? 0xffffu : (1u << (candidates->count - c)) - 1u;
+        if ((unsigned)(self - c) < LANES)
+            valid &= ~(1u << (self - c));
+        n += vi_compress(list + n, scratch->index + c, (Vm)(vf_less(distance_sq, limit) & valid));
+        if (n > MAX_NEIGHBOURS)
+            return -1;
+    }
+    return n;
+}
+
+static inline void entry_store_index(uint8_t *entries, uint32_t entry, bool wide, Vi offset) {
+    if (wide)
+        vi_store(((RowEntryWide *)entries)[entry].index, offset);
+    else
+        vi_store_i16(((RowEntry *)entries)[entry].index, offset);
+}
+
+static inline int16_t *entry_gradient(const uint8_t *entries, uint32_t entry, bool wide) {
+    return wide ? (int16_t *)((const RowEntryWide *)entries)[entry].gradient[0]
+                : (int16_t *)((const RowEntry *)entries)[entry].gradient[0];
+}
+
+/* Turns the sixteen lists in scratch into row entries, densities and gradient sums. True if all offsets fit 16 bits or wide. */
+static bool pack_slice(const SearchJob *job, uint32_t first, const int32_t counts[SLICE], int length,
+                       uint32_t entry, const Scratch *scratch) {
+    const int32_t stride = MAX_NEIGHBOURS + LANES;
+    int32_t row_starts[SLICE];
+    for (int l = 0; l < SLICE; l++)
+        row_starts[l] = l * stride;
+    const Vi row_start = vi_load(row_starts), count = vi_load(counts);
+    const Vi own = vi_add(vi_set((int32_t)first), vi_lane());
+    Vf x, y, z, w;
+    vf_load4(job->position + first, &x, &y, &z, &w);
+    Vf sum_x = vf_zero(), sum_y = vf_zero(), sum_z = vf_zero(), sum_sq = vf_zero(), sum_w = vf_zero();
+    Vm misfit = 0;
+    for (int k = 0; k < length; k++, entry++) {
+        const Vm valid = vi_less(vi_set(k), count);
+        const Vi index = vi_select(valid, vi_gather(scratch->list[0] + k, row_start), own);
+        const Vi offset = vi_add(index, vi_set(-(int32_t)first));
+        misfit |= vi_less(offset, vi_set(INT16_MIN)) | vi_less(vi_set(INT16_MAX), offset);
+        Vf nx, ny, nz;
+        vf_gather4(job->position, index, &nx, &ny, &nz, &w);
+        const Vf dx = vf_sub(x, nx), dy = vf_sub(y, ny), dz = vf_sub(z, nz);
+        Vf factor, weight;
+        pair_kernel(&job->kernel, vf_fma(dx, dx, vf_fma(dy, dy, vf_mul(dz, dz))), &factor, &weight);
+        int16_t *gradient = entry_gradient(job->entries, entry, job->wide);
+        entry_store_index(job->entries, entry, job->wide, offset);
+        vf_store_i16(gradient, vf_mul(factor, dx)); /* own lanes: dx = 0 */
+        vf_store_i16(gradient + SLICE, vf_mul(factor, dy));
+        vf_store_i16(gradient + 2 * SLICE, vf_mul(factor, dz));
+        const Vf gx = vf_load_i16(gradient), gy = vf_load_i16(gradient + SLICE),
+                 gz = vf_load_i16(gradient + 2 * SLICE);
+        sum_x = vf_add(sum_x, gx);
+        sum_y = vf_add(sum_y, gy);
+        sum_z = vf_add(sum_z, gz);
+        sum_sq = vf_fma(gx, gx, vf_fma(gy, gy, vf_fma(gz, gz, sum_sq)));
+        sum_w = vf_add(sum_w, vf_mask(valid, weight));
+    }
+    vf_store4(job->gradient_sum + first, sum_x, sum_y, sum_z, sum_sq);
+    vf_store(job->density + first, vf_mul(vf_set(job->volume), vf_add(sum_w, vf_set(job->kernel.w_scale))));
+    return job->wide || misfit == 0;
+}
+
+static int search(const SearchJob *job, uint32_t block, int thread, Scratch *scratch, uint32_t *fault) {
+    uint32_t current_cell = UINT32_MAX;
+    Candidates candidates = {0};
+    int status = SEARCH_OK;
+    for (uint32_t slice = block * BLOCK_SLICES; slice < (block + 1) * BLOCK_SLICES; slice++) {
+        const uint32_t first = slice * SLICE;
+        int32_t counts[SLICE] = {0};
+        int length = 0;
+        for (uint32_t l = 0; l < SLICE && first + l < job->count; l++) {
+            const uint32_t i = first + l;
+            bool fits = true;
+            if (job->cell[i] != current_cell) {
+                current_cell = job->cell[i];
+                fits = gather_candidates(job, current_cell, scratch, &candidates);
+            }
+            counts[l] = fits ? find_neighbours(job, &candidates, i, scratch, scratch->list[l]) : -1;
+            if (counts[l] < 0) {
+                *fault = i;
+                return SEARCH_TOO_DENSE;
+            }
+            job->neighbours[i] = (uint16_t)counts[l];
+            length = counts[l] > length ? counts[l] : length;
+        }
+        job->slice_length[slice] = (uint16_t)length;
+        job->slice_start[slice] = 0;
+        if (first >= job->count) {
+            for (uint32_t i = first; i < first + SLICE; i++) {
+                memset(job->gradient_sum[i], 0, sizeof(Float4));
+                job->density[i] = 0.0f;
+            }
+            continue;
+        }
+        const uint32_t entry = job->allocate(job->rows, thread, (uint32_t)length);
+        if (entry == UINT32_MAX)
+            return SEARCH_NEEDS_MEMORY;
+        job->slice_start[slice] = entry;
+        if (!pack_slice(job, first, counts, length, entry, scratch))
+            status = SEARCH_NEEDS_WIDE;
+    }
+    return status;
+}
+
+/* ---- Walls and bodies ---- */
+
+/* Sums over one object's samples near one particle, a lane a sample. */
+typedef struct ContactSum {
+    int32_t object;
+    int count;
+    Vf weight, g[3], t[3];
+} ContactSum;
+
+typedef struct ContactSums {
+    int count;
+    ContactSum sums[MAX_CONTACT_OBJECTS];
+} ContactSums;
+
+static ContactSum *contact_sum_of(ContactSums *sums, int32_t object) {
+    for (int k = 0; k < sums->count; k++)
+        if (sums->sums[k].object == object)
+            return &sums->sums[k];
+    if (sums->count == MAX_CONTACT_OBJECTS)
+        return NULL;
+    ContactSum *sum = &sums->sums[sums->count++];
+    sum->object = object;
+    sum->count = 0;
+    sum->weight = vf_zero();
+    for (int k = 0; k < 3; k++)
+        sum->g[k] = sum->t[k] = vf_zero();
+    return sum;
+}
+
+/* Adds up to sixteen samples beginning at s; near: lanes in reach. */
+static bool contact_add(const BoundaryJob *job, const SampleSet *set, uint32_t s, Vm near, const Vf d[3],
+                        ContactSums *sums) {
+    const Vf volume = vf_load(set->volume + s);
+    const Vf position[3] = {vf_load(set->x + s), vf_load(set->y + s), vf_load(set->z + s)};
+    const Vi object = vi_load(set->object + s);
+    const Vf distance_sq = vf_fma(d[0], d[0], vf_fma(d[1], d[1], vf_mul(d[2], d[2])));
+    Vf factor, weight;
+    pair_kernel(&job->kernel, distance_sq, &factor, &weight);
+    /* pair_kernel's unit belongs to a fluid particle's volume: back to 1/m^4, times psi */
+    factor = vf_mul(vf_mul(factor, vf_set(job->kernel.gradient_scale / GRADIENT_STEPS)), volume);
+    weight = vf_mul(weight, volume);
+    uint32_t left = near;
+    while (left != 0) {
+        const int32_t id = set->object[s + (uint32_t)__builtin_ctz(left)];
+        const Vm mine = (Vm)(left & vi_equal(object, vi_set(id)));
+        left &= ~(uint32_t)mine;
+        ContactSum *sum = contact_sum_of(sums, id);
+        if (sum == NULL)
+            return false;
+        Vf g[3], arm[3];
+        for (int k = 0; k < 3; k++) {
+            g[k] = vf_mask(mine, vf_mul(factor, d[k]));
+            arm[k] = vf_sub(position[k], vf_set(job->centres[id][k]));
+            sum->g[k] = vf_add(sum->g[k], g[k]);
+        }
+        for (int k = 0; k < 3; k++) {
+            const int a = (k + 1) % 3, b = (k + 2) % 3;
+            sum->t[k] = vf_fma(arm[a], g[b], vf_fnma(arm[b], g[a], sum->t[k]));
+        }
+        sum->weight = vf_add(sum->weight, vf_mask(mine, weight));
+        sum->count += __builtin_popcount(mine);
+    }
+    return true;
+}
+
+static bool contacts_of_particle(const BoundaryJob *job, const SampleSet *set, const float *p, ContactSums *sums) {
+    int32_t c[3];
+    for (int k = 0; k < 3; k++) {
+        c[k] = (int32_t)floorf((p[k] - set->grid.origin[k]) * set->grid.inv_size);
+        if (c[k] < 0 || c[k] >= set->grid.size[k])
+            return true;
+    }
+    const int32_t cell = cell_grid_index(&set->grid, c[0], c[1], c[2]);
+    if (!set->occupied[cell])
+        return true;
+    const Vf limit = vf_set(job->kernel.support * job->kernel.support);
+    const int32_t column = set->grid.size[1], slab = set->grid.size[1] * set->grid.size[2];
+    for (int run = 0; run < 9; run++) {
+        const int32_t middle = cell + (run / 3 - 1) * slab + (run % 3 - 1) * column;
+        const uint32_t end = set->grid.start[middle + 2];
+        for (uint32_t s = set->grid.start[middle - 1]; s < end; s += LANES) {
+            const Vf d[3] = {vf_sub(vf_set(p[0]), vf_load(set->x + s)), vf_sub(vf_set(p[1]), vf_load(set->y + s)),
+                             vf_sub(vf_set(p[2]), vf_load(set->z + s))};
+            const Vf distance_sq = vf_fma(d[0], d[0], vf_fma(d[1], d[1], vf_mul(d[2], d[2])));
+            const uint32_t valid = end - s >= LANES ? 0xffffu : (1u << (end - s)) - 1u;
+            const Vm near = (Vm)(vf_less(distance_sq, limit) & valid);
+            if (near != 0 && !contact_add(job, set, s, near, d, sums))
+                return false;
+        }
+    }
+    return true;
+}
+
+static int boundary(const BoundaryJob *job, uint32_t block, Scratch *scratch, uint32_t *fault) {
+    int contact_count = 0;
+    const uint32_t begin = block * BLOCK, end = begin + BLOCK < job->count ? begin + BLOCK : job->count;
+    for (uint32_t i = begin; i < end; i++) {
+        ContactSums sums;
+        sums.count = 0;
+        for (int k = 0; k < 2; k++) {
+            if (job->sets[k]->count != 0 && !contacts_of_particle(job, job->sets[k], job->position[i], &sums)) {
+                *fault = i;
+                return -1;
+            }
+        }
+        float g[3] = {0};
+        for (int k = 0; k < sums.count; k++) {
+            const ContactSum *sum = &sums.sums[k];
+            Contact *contact = &scratch->contacts[contact_count++];
+            contact->particle = i;
+            contact->object = (uint32_t)sum->object;
+            for (int a = 0; a < 3; a++) {
+                contact->g[a] = vf_sum(sum->g[a]);
+                contact->t[a] = vf_sum(sum->t[a]);
+                g[a] += contact->g[a];
+            }
+            contact->weight = vf_sum(sum->weight);
+            if (job->density == NULL)
+                continue;
+            job->density[i] += contact->weight;
+            job->neighbours[i] = (uint16_t)(job->neighbours[i] + sum->count);
+        }
+        if (job->density == NULL)
+            continue;
+        float *sum = job->gradient_sum[i];
+        const float unit = job->gradient_unit;
+        const float squares = sum[3] * unit * unit;
+        float norm_sq = 0.0f;
+        for (int a = 0; a < 3; a++) {
+            sum[a] = sum[a] * unit + g[a];
+            norm_sq += sum[a] * sum[a];
+        }
+        sum[3] = norm_sq + squares;
+    }
+    return contact_count;
+}
+
+/* ---- The operators of the pressure solves ---- */
+
+static inline Vi entry_index(const uint8_t *entries, uint32_t entry, bool wide) {
+    return wide ? vi_load(((const RowEntryWide *)entries)[entry].index)
+                : vi_load_i16(((const RowEntry *)entries)[entry].index);
+}
+
+static inline void accelerate_slices(const PairData *pairs, const float *p, Float4 *result, uint32_t block,
+                                     const bool wide) {
+    const Vf unit = vf_set(pairs->gradient_unit);
+    for (uint32_t slice = block * BLOCK_SLICES; slice < (block + 1) * BLOCK_SLICES; slice++) {
+        const uint32_t first = slice * SLICE, begin = pairs->slice_start[slice];
+        const float *slice_p = p + first;
+        Vf x = vf_zero(), y = vf_zero(), z = vf_zero();
+        for (uint32_t entry = begin; entry < begin + pairs->slice_length[slice]; entry++) {
+            const Vf neighbour_p = vf_gather(slice_p, entry_index(pairs->entries, entry, wide));
+            const int16_t *gradient = entry_gradient(pairs->entries, entry, wide);
+            x = vf_fma(neighbour_p, vf_load_i16(gradient), x);
+            y = vf_fma(neighbour_p, vf_load_i16(gradient + SLICE), y);
+            z = vf_fma(neighbour_p, vf_load_i16(gradient + 2 * SLICE), z);
+        }
+        Vf gx, gy, gz, diagonal;
+        vf_load4(pairs->gradient_sum + first, &gx, &gy, &gz, &diagonal);
+        const Vf own_p = vf_load(slice_p);
+        vf_store4(result + first, vf_fma(own_p, gx, vf_mul(x, unit)), vf_fma(own_p, gy, vf_mul(y, unit)),
+                  vf_fma(own_p, gz, vf_mul(z, unit)), vf_zero());
+    }
+}
+
+static void accelerate(const PairData *pairs, const float *p, Float4 *result, uint32_t block) {
+    if (pairs->wide)
+        accelerate_slices(pairs, p, result, block, true);
+    else
+        accelerate_slices(pairs, p, result, block, false);
+}
+
+static inline void divergence_slices(const PairData *pairs, const Float4 *v, float *result, uint32_t block,
+                                     const bool wide) {
+    const Vf unit = vf_set(-pairs->gradient_unit);
+    for (uint32_t slice = block * BLOCK_SLICES; slice < (block + 1) * BLOCK_SLICES; slice++) {
+        const uint32_t first = slice * SLICE, begin = pairs->slice_start[slice];
+        const Float4 *slice_v = v + first;
+        Vf sum = vf_zero(), x, y, z, w;
+        for (uint32_t entry = begin; entry < begin + pairs->slice_length[slice]; entry++) {
+            vf_gather4(slice_v, entry_index(pairs->entries, entry, wide), &x, &y, &z, &w);
+            const int16_t *gradient = entry_gradient(pairs->entries, entry, wide);
+            sum = vf_fma(x, vf_load_i16(gradient), sum);
+            sum = vf_fma(y, vf_load_i16(gradient + SLICE), sum);
+            sum = vf_fma(z, vf_load_i16(gradient + 2 * SLICE), sum);
+        }
+        Vf gx, gy, gz, diagonal;
+        vf_load4(pairs->gradient_sum + first, &gx, &gy, &gz, &diagonal);
+        vf_load4(slice_v, &x, &y, &z, &w);
+        vf_store(result + first, vf_fma(x, gx, vf_fma(y, gy, vf_fma(z, gz, vf_mul(sum, unit)))));
+    }
+}
+
+static void divergence(const PairData *pairs, const Float4 *v, float *result, uint32_t block) {
+    if (pairs->wide)
+        divergence_slices(pairs, v, result, block, true);
+    else
+        divergence_slices(pairs, v, result, block, false);
+}
+
+/* ---- Gravity and viscosity ---- */
+
+/* v_i + dt g - nu sum_j (V / rho_j) (v_i - v_j) W_ij [Schechter & Bridson 2012]; walls and bodies do not take part here. The pairs' weights are
+ * made again from the positions: storing them would make every iteration's stream a quarter wider. */
+static void forces(const ForceJob *job, uint32_t block) {
+    const PairData *pairs = job->pairs;
+    const Vf share = vf_set(-job->viscosity * pairs->volume);
+    for (uint32_t slice = block * BLOCK_SLICES; slice < (block + 1) * BLOCK_SLICES; slice++) {
+        const uint32_t first = slice * SLICE, begin = pairs->slice_start[slice];
+        Vf px, py, pz, vx, vy, vz, w, x, y, z;
+        Vf sx = vf_zero(), sy = vf_zero(), sz = vf_zero();
+        vf_load4(pairs->position + first, &px, &py, &pz, &w);
+        vf_load4(job->velocity + first, &vx, &vy, &vz, &w);
+        const uint32_t length = job->viscosity > 0.0f ? pairs->slice_length[slice] : 0;
+        for (uint32_t entry = begin; entry < begin + length; entry++) {
+            Vi index = entry_index(pairs->entries, entry, pairs->wide);
+            vf_gather4(pairs->position + first, index, &x, &y, &z, &w);
+            const Vf dx = vf_sub(px, x), dy = vf_sub(py, y), dz = vf_sub(pz, z);
+            const Vf distance_sq = vf_fma(dx, dx, vf_fma(dy, dy, vf_mul(dz, dz)));
+            Vf factor, weight;
+            pair_kernel(&pairs->kernel, distance_sq, &factor, &weight);
+            vf_gather4(job->velocity + first, index, &x, &y, &z, &w);
+            weight = vf_div(weight, vf_gather(pairs->density + first, index));
+            /* unused places are the particle itself: their velocity difference is zero */
+            sx = vf_fma(weight, vf_sub(vx, x), sx);
+            sy = vf_fma(weight, vf_sub(vy, y), sy);
+            sz = vf_fma(weight, vf_sub(vz, z), sz);
+        }
+        vf_store4(job->result + first, vf_fma(share, sx, vf_add(vx, vf_set(job->gravity_dt[0]))),
+                  vf_fma(share, sy, vf_add(vy, vf_set(job->gravity_dt[1]))),
+                  vf_fma(share, sz, vf_add(vz, vf_set(job->gravity_dt[2]))), vf_zero());
+    }
+}
+
+const Passes PASSES_JOIN(passes_, PASSES_ISA) = {
+    .name = PASSES_TEXT(PASSES_ISA),
+    .search = search,
+    .boundary = boundary,
+    .accelerate = accelerate,
+    .divergence = divergence,
+    .forces = forces,
+};

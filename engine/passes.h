@@ -1,0 +1,168 @@
+/* The hot loops: everything that visits particle pairs. One text (passes.c) compiled once per instruction set; a table of functions
+ * each; all tables give the same bits.
+ *
+ * Particles are sorted by cell. Sixteen consecutive ones form a slice, 64 slices a block. A block is the unit of scheduling and of
+ * summation: whatever thread runs it, it writes its own particles only, and sums over particles are taken per block and then over the blocks
+ * in order. */
+#ifndef SKIFF_PASSES_H
+#define SKIFF_PASSES_H
+
+#include "base/simd.h"
+#include "kernel.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+enum {
+    SLICE = LANES,            /* particles a slice */
+    BLOCK_SLICES = 64,        /* slices a block */
+    BLOCK = SLICE * BLOCK_SLICES,
+    MAX_NEIGHBOURS = 496,     /* fluid neighbours a particle may have; at rest it has 34 */
+    MAX_CANDIDATES = 8192,    /* particles in the 27 cells around one */
+    MAX_CONTACT_OBJECTS = 8   /* walls and bodies that may touch one particle */
+};
+
+/* One k-th neighbour for each of a slice's sixteen particles, two cache lines: the neighbour as offset from the slice's first
+ * particle, and V grad W in units of its largest possible magnitude / 32767. Fixed point is ten times as accurate as half precision where it
+ * matters, exactly antisymmetric, and needs no special instruction. Unused places point at the particle itself with gradient 0. */
+typedef struct RowEntry {
+    int16_t index[SLICE];
+    int16_t gradient[3][SLICE];
+} RowEntry;
+
+/* The same with room for any offset, for flows so wide that an offset may leave 16 bits. */
+typedef struct RowEntryWide {
+    int32_t index[SLICE];
+    int16_t gradient[3][SLICE];
+} RowEntryWide;
+
+/* Cells of edge h over the particles' bounds with one empty layer around; y fastest, then z, then x: the three cells of a column that a
+ * particle sees are one contiguous run of particles. */
+typedef struct CellGrid {
+    float origin[3]; /* m */
+    float inv_size;  /* 1/m */
+    int32_t size[3]; /* cells along x, y, z */
+    const uint32_t *start; /* [cells + 1] first particle of a cell */
+} CellGrid;
+
+static inline int32_t cell_grid_index(const CellGrid *grid, int32_t x, int32_t y, int32_t z) {
+    return (x * grid->size[2] + z) * grid->size[1] + y;
+}
+
+/* Terms of one particle against one wall or body, summed over its samples b of volume psi_b: g = sum psi_b grad W_ib,
+ * t = sum psi_b (x_b - c) x grad W_ib with c the object's centre (origin for walls). They replace the samples in every iteration. */
+typedef struct Contact {
+    uint32_t particle;
+    uint32_t object;
+    float g[3]; /* 1/m */
+    float t[3]; /* 1 */
+    float weight; /* sum psi_b W_ib */
+} Contact;
+
+typedef struct ContactSpan {
+    uint32_t start, count;
+} ContactSpan;
+
+/* Samples of walls or of bodies, sorted by cell. */
+typedef struct SampleSet {
+    CellGrid grid;
+    const uint8_t *occupied; /* [cells] 1 where any of the 27 cells around holds a sample */
+    const float *x, *y, *z;  /* m; padded by a slice */
+    const float *volume;     /* psi, m^3 */
+    const int32_t *object;   /* grouped within a cell */
+    uint32_t count;
+} SampleSet;
+
+/* Scratch of one thread; too large for the stack. */
+typedef struct Scratch {
+    float x[MAX_CANDIDATES + LANES], y[MAX_CANDIDATES + LANES], z[MAX_CANDIDATES + LANES];
+    int32_t index[MAX_CANDIDATES + LANES];
+    int32_t list[SLICE][MAX_NEIGHBOURS + LANES];
+    Contact contacts[BLOCK * MAX_CONTACT_OBJECTS];
+} Scratch;
+
+/* What every pair pass reads. Arrays are padded to whole blocks. */
+typedef struct PairData {
+    uint32_t count;
+    Kernel kernel;
+    float volume;         /* V, m^3 */
+    float gradient_unit;  /* value of 1 in RowEntry.gradient, 1/m */
+    bool wide;
+    const uint8_t *entries;      /* RowEntry or RowEntryWide */
+    const uint32_t *slice_start; /* first entry of a slice */
+    const uint16_t *slice_length;
+    const Float4 *position;
+    const float *density;        /* rho / rho0 */
+    const Float4 *gradient_sum;  /* G_i = sum_j V grad W_ij + g_i; [3]: diagonal of D D^T */
+} PairData;
+
+typedef enum SearchStatus {
+    SEARCH_OK = 0,
+    SEARCH_NEEDS_WIDE = 1,   /* an index offset does not fit RowEntry */
+    SEARCH_TOO_DENSE = 2,    /* more than MAX_NEIGHBOURS or MAX_CANDIDATES */
+    SEARCH_NEEDS_MEMORY = 4, /* the row pool is too small */
+    SEARCH_TOO_MANY_OBJECTS = 8
+} SearchStatus;
+
+/* Takes room for `entries` row entries; returns the first or UINT32_MAX when the pool is used up. Called by several threads. */
+typedef uint32_t RowAllocate(void *rows, int thread, uint32_t entries);
+
+typedef struct SearchJob {
+    const CellGrid *grid;
+    const uint32_t *cell; /* cell of every particle */
+    const Float4 *position;
+    uint32_t count;
+    Kernel kernel;
+    float volume;
+    bool wide;
+    uint8_t *entries;
+    uint32_t *slice_start;
+    uint16_t *slice_length;
+    float *density;
+    Float4 *gradient_sum; /* in units of gradient_unit; [3]: sum of squares */
+    uint16_t *neighbours;
+    RowAllocate *allocate;
+    void *rows;
+} SearchJob;
+
+typedef struct BoundaryJob {
+    const SampleSet *sets[2]; /* walls, bodies */
+    const Float4 *position;
+    const Float4 *centres; /* of every object */
+    uint32_t count;
+    Kernel kernel;
+    float gradient_unit;
+    float *density;       /* NULL: list the contacts only */
+    Float4 *gradient_sum; /* in: as the search left it; out: in 1/m, with the boundary, [3] the diagonal */
+    uint16_t *neighbours;
+} BoundaryJob;
+
+typedef struct ForceJob {
+    const PairData *pairs;
+    const Float4 *velocity; /* in */
+    Float4 *result;         /* out: velocity after gravity and viscosity */
+    float gravity_dt[3];
+    float viscosity;
+} ForceJob;
+
+typedef struct Passes {
+    const char *name;
+    /* Neighbours of a block's particles: rows, density, gradient sums. Returns SearchStatus bits; on too dense, *fault is the particle. */
+    int (*search)(const SearchJob *job, uint32_t block, int thread, Scratch *scratch, uint32_t *fault);
+    /* Boundary terms of a block's particles; contacts go to scratch->contacts. Returns how many, or -1 with *fault. */
+    int (*boundary)(const BoundaryJob *job, uint32_t block, Scratch *scratch, uint32_t *fault);
+    /* result_i = (D^T p)_i = p_i G_i + sum_j p_j V grad W_ij */
+    void (*accelerate)(const PairData *pairs, const float *p, Float4 *result, uint32_t block);
+    /* result_i = (D v)_i = v_i . G_i - sum_j v_j . V grad W_ij; contacts with moving bodies are the caller's */
+    void (*divergence)(const PairData *pairs, const Float4 *v, float *result, uint32_t block);
+    /* gravity and XSPH viscosity */
+    void (*forces)(const ForceJob *job, uint32_t block);
+} Passes;
+
+extern const Passes passes_plain;
+#ifdef SKIFF_HAVE_X86
+extern const Passes passes_avx2;
+extern const Passes passes_avx512;
+#endif
+
+#endif

@@ -1,0 +1,123 @@
+/* Memory and scheduling of the neighbour search; the search itself is in passes.c. */
+#include "rows.h"
+
+#include <omp.h>
+
+enum { CHUNK_ENTRIES = 4096 };
+
+size_t rows_entry_size(bool wide) {
+    return wide ? sizeof(RowEntryWide) : sizeof(RowEntry);
+}
+
+Scratch *rows_scratch(Rows *rows, int thread) {
+    return (Scratch *)rows->scratch.data + thread;
+}
+
+static uint32_t rows_allocate(void *user, int thread, uint32_t entries) {
+    Rows *rows = user;
+    RowShare *share = &rows->shares[thread];
+    if (share->end - share->next < entries) {
+        const uint32_t chunk = entries > CHUNK_ENTRIES ? entries : CHUNK_ENTRIES;
+        const uint32_t begin = atomic_fetch_add_explicit(&rows->pool_used, chunk, memory_order_relaxed);
+        if (begin + (uint64_t)chunk > rows->pool_entries)
+            return UINT32_MAX;
+        share->next = begin;
+        share->end = begin + chunk;
+    }
+    const uint32_t first = share->next;
+    share->next += entries;
+    return first;
+}
+
+static bool rows_reserve(Rows *rows, const Particles *particles, int threads, Err *err) {
+    const size_t padded = particles->capacity + SLICE, slices = particles->capacity / SLICE + 1;
+    if (rows->pool_entries == 0) /* 45 places a particle: 39 are needed in water at rest */
+        rows->pool_entries = (uint32_t)(slices * 45) + CHUNK_ENTRIES * (uint32_t)threads;
+    return buffer_reserve(&rows->pool, "neighbour rows", rows->pool_entries * rows_entry_size(rows->wide), err) &&
+           buffer_reserve(&rows->slice_start, "row starts", slices * sizeof(uint32_t), err) &&
+           buffer_reserve(&rows->slice_length, "row lengths", slices * sizeof(uint16_t), err) &&
+           buffer_reserve(&rows->density, "density", padded * sizeof(float), err) &&
+           buffer_reserve(&rows->gradient_sum, "gradient sums", padded * sizeof(Float4), err) &&
+           buffer_reserve(&rows->neighbour_counts, "neighbour counts", padded * sizeof(uint16_t), err) &&
+           buffer_reserve(&rows->scratch, "search scratch", (size_t)threads * sizeof(Scratch), err);
+}
+
+/* One try; returns SearchStatus bits. */
+static int rows_search(Rows *rows, const Passes *passes, const SearchJob *job, int threads, uint32_t *fault) {
+    atomic_store(&rows->pool_used, 0);
+    memset(rows->shares, 0, sizeof rows->shares);
+    const uint32_t blocks = (job->count + BLOCK - 1) / BLOCK;
+    int status = SEARCH_OK;
+    uint32_t first_fault = UINT32_MAX;
+#pragma omp parallel num_threads(threads) reduction(| : status) reduction(min : first_fault)
+    {
+        const int thread = omp_get_thread_num();
+#pragma omp for schedule(dynamic, 2)
+        for (uint32_t block = 0; block < blocks; block++) {
+            uint32_t particle = UINT32_MAX;
+            status |= passes->search(job, block, thread, rows_scratch(rows, thread), &particle);
+            first_fault = particle < first_fault ? particle : first_fault;
+        }
+    }
+    *fault = first_fault;
+    return status;
+}
+
+bool rows_build(Rows *rows, const Passes *passes, const Grid *grid, const Particles *particles, const Kernel *kernel,
+                float volume, int threads, Err *err) {
+    for (;;) {
+        if (!rows_reserve(rows, particles, threads, err))
+            return false;
+        rows->neighbours = rows->neighbour_counts.data;
+        const SearchJob job = {.grid = &grid->cells,
+                               .cell = grid->cell,
+                               .position = (const Float4 *)particles->position,
+                               .count = particles->count,
+                               .kernel = *kernel,
+                               .volume = volume,
+                               .wide = rows->wide,
+                               .entries = rows->pool.data,
+                               .slice_start = rows->slice_start.data,
+                               .slice_length = rows->slice_length.data,
+                               .density = rows->density.data,
+                               .gradient_sum = rows->gradient_sum.data,
+                               .neighbours = rows->neighbours,
+                               .allocate = rows_allocate,
+                               .rows = rows};
+        uint32_t fault;
+        const int status = rows_search(rows, passes, &job, threads, &fault);
+        if (status & SEARCH_TOO_DENSE)
+            return err_set(err, ERR_DIVERGED,
+                           "particle %llu has more than %d neighbours, or more than %d particles in the cells "
+                           "around it; water at rest has 34",
+                           (unsigned long long)particles->id[fault], MAX_NEIGHBOURS, MAX_CANDIDATES);
+        if (status & SEARCH_NEEDS_MEMORY)
+            rows->pool_entries += rows->pool_entries / 2;
+        if (status & SEARCH_NEEDS_WIDE)
+            rows->wide = true;
+        if (status == SEARCH_OK) {
+            rows->pairs = (PairData){.count = job.count,
+                                     .kernel = *kernel,
+                                     .volume = volume,
+                                     .gradient_unit = volume * kernel->gradient_scale / (3.0f * 32767.0f),
+                                     .wide = rows->wide,
+                                     .entries = job.entries,
+                                     .slice_start = job.slice_start,
+                                     .slice_length = job.slice_length,
+                                     .position = job.position,
+                                     .density = job.density,
+                                     .gradient_sum = (const Float4 *)job.gradient_sum};
+            return true;
+        }
+    }
+}
+
+void rows_free(Rows *rows) {
+    buffer_free(&rows->pool);
+    buffer_free(&rows->slice_start);
+    buffer_free(&rows->slice_length);
+    buffer_free(&rows->density);
+    buffer_free(&rows->gradient_sum);
+    buffer_free(&rows->neighbour_counts);
+    buffer_free(&rows->scratch);
+}

@@ -1,0 +1,36 @@
+/* The packed neighbour rows of one step: built once, streamed by every iteration. */
+#ifndef SKIFF_ROWS_H
+#define SKIFF_ROWS_H
+
+#include "grid.h"
+
+#include <stdatomic.h>
+
+enum { ROWS_MAX_THREADS = 256 };
+
+typedef struct RowShare {
+    uint32_t next, end; /* entries of the pool this thread may still take */
+    char padding[56];   /* a cache line each */
+} RowShare;
+
+typedef struct Rows {
+    PairData pairs;
+    uint16_t *neighbours; /* [particles] fluid and boundary */
+    bool wide;
+    /* pool of row entries: threads take chunks, slices take from their thread's chunk */
+    Buffer pool, slice_start, slice_length, density, gradient_sum, neighbour_counts;
+    uint32_t pool_entries;
+    atomic_uint pool_used;
+    RowShare shares[ROWS_MAX_THREADS];
+    Buffer scratch; /* Scratch of every thread */
+} Rows;
+
+/* Neighbours, densities (fluid part) and gradient sums (fluid part, fixed-point units) of the sorted particles. Grows the pool when it is too
+ * small, and turns to wide entries when offsets do not fit: both happen in the first steps or never. */
+bool rows_build(Rows *rows, const Passes *passes, const Grid *grid, const Particles *particles, const Kernel *kernel,
+                float volume, int threads, Err *err);
+void rows_free(Rows *rows);
+Scratch *rows_scratch(Rows *rows, int thread);
+size_t rows_entry_size(bool wide);
+
+#endif

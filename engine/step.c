@@ -1,0 +1,248 @@
+/* ONE STEP, TOP TO BOTTOM. Read this first.
+ *
+ * [Carensac2023 alg. 2], with the pressure solves of dfsph.c:
+ *   emit blocks -> move body samples -> sort -> search -> boundary terms -> divergence solve -> gravity and viscosity -> density solve -> advance. */
+#define _POSIX_C_SOURCE 200809L
+#include "sim.h"
+
+#include <math.h>
+#include <time.h>
+
+double timer_ms(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec * 1e3 + (double)now.tv_nsec * 1e-6;
+}
+
+/* Sums over a block's particles that the statistics are made of. */
+typedef struct AdvanceSums {
+    double speed, height, energy, momentum[3], density_error, neighbours;
+    float max_speed_sq, max_density;
+} AdvanceSums;
+
+static DfsphProblem step_problem(SkiffSim *sim) {
+    return (DfsphProblem){.params = &sim->params,
+                          .passes = sim->passes,
+                          .rows = &sim->rows,
+                          .boundary = &sim->boundary,
+                          .bodies = sim->bodies,
+                          .body_count = sim->body_count,
+                          .particles = &sim->particles,
+                          .threads = sim->threads};
+}
+
+static bool place_bodies(SkiffSim *sim, Err *err) {
+    for (int b = 0; b < sim->body_count; b++) {
+        body_hold(&sim->bodies[b], sim->time, (double)sim->params.time_step);
+        body_prepare(&sim->bodies[b], sim->time);
+    }
+    return boundary_place(&sim->boundary, sim->bodies, sim->body_count, sim->origin, sim->kernel.support,
+                          sim->threads, err);
+}
+
+static bool sort_particles(SkiffSim *sim, Err *err) {
+    const bool remove = sim->params.escape == 1;
+    sim->stats.removed = 0;
+    return grid_sort(&sim->grid, &sim->particles, sim->kernel.support, &sim->domain,
+                     remove ? &sim->stats.removed : NULL, sim->threads, err);
+}
+
+static bool find_neighbours(SkiffSim *sim, Err *err) {
+    return rows_build(&sim->rows, sim->passes, &sim->grid, &sim->particles, &sim->kernel, sim->volume, sim->threads,
+                      err);
+}
+
+static bool add_boundary(SkiffSim *sim, Err *err) {
+    return boundary_apply(&sim->boundary, &sim->rows, sim->passes, &sim->particles, sim->threads, err);
+}
+
+static void solve_divergence(SkiffSim *sim) {
+    const DfsphProblem problem = step_problem(sim);
+    const SolveResult result = dfsph_solve(&sim->dfsph, &problem, SOLVE_DIVERGENCE);
+    sim->stats.divergence_iterations = result.iterations;
+    sim->stats.divergence_error_percent = 100.0 * result.error;
+}
+
+static void apply_forces(SkiffSim *sim) {
+    const float dt = sim->params.time_step;
+    const float *g = sim->params.gravity;
+    const ForceJob job = {.pairs = &sim->rows.pairs,
+                          .velocity = (const Float4 *)sim->particles.velocity,
+                          .result = sim->dfsph.guess,
+                          .gravity_dt = {dt * g[0], dt * g[1], dt * g[2]},
+                          .viscosity = sim->params.viscosity};
+    const uint32_t blocks = particles_blocks(&sim->particles);
+#pragma omp parallel for schedule(static) num_threads(sim->threads)
+    for (uint32_t block = 0; block < blocks; block++)
+        sim->passes->forces(&job, block);
+#pragma omp parallel for schedule(static) num_threads(sim->threads)
+    for (uint32_t block = 0; block < blocks; block++)
+        memcpy(sim->particles.velocity + (size_t)block * BLOCK, sim->dfsph.guess + (size_t)block * BLOCK,
+               BLOCK * sizeof(Float4));
+    for (int b = 0; b < sim->body_count; b++)
+        body_push(&sim->bodies[b], g, sim->time, (double)dt);
+}
+
+static void solve_density(SkiffSim *sim) {
+    const DfsphProblem problem = step_problem(sim);
+    const SolveResult result = dfsph_solve(&sim->dfsph, &problem, SOLVE_DENSITY);
+    sim->stats.density_iterations = result.iterations;
+    sim->stats.residual_percent = 100.0 * result.residual;
+}
+
+/* Forces of the fluid on tank and bodies during this step, from the pressures of both solves. */
+static void measure_forces(SkiffSim *sim) {
+    float *total = sim->total_pressure.data;
+    const Particles *particles = &sim->particles;
+#pragma omp parallel for schedule(static) num_threads(sim->threads)
+    for (uint32_t i = 0; i < particles->count; i++)
+        total[i] = particles->pressure[i] + particles->pressure_divergence[i];
+    double(*forces)[6] = sim->object_forces.data;
+    boundary_impulse(&sim->boundary, total, particles_blocks(particles), forces, sim->threads);
+    const double dt = sim->params.time_step;
+    const double scale = (double)sim->volume * (double)sim->params.rest_density / (dt * dt);
+    for (uint32_t o = 0; o < sim->boundary.object_count; o++)
+        for (int k = 0; k < 6; k++)
+            forces[o][k] *= scale;
+}
+
+static AdvanceSums advance_block(SkiffSim *sim, uint32_t block) {
+    const Particles *particles = &sim->particles;
+    const float dt = sim->params.time_step;
+    const float *density = sim->rows.pairs.density;
+    const uint32_t begin = block * BLOCK;
+    const uint32_t end = begin + BLOCK < particles->count ? begin + BLOCK : particles->count;
+    AdvanceSums sums = {0};
+    for (uint32_t i = begin; i < end; i++) {
+        float *x = particles->position[i], *v = particles->velocity[i];
+        for (int k = 0; k < 3; k++) {
+            x[k] += dt * v[k];
+            sums.momentum[k] += (double)v[k];
+        }
+        const float speed_sq = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+        sums.speed += (double)sqrtf(speed_sq);
+        sums.energy += (double)speed_sq;
+        sums.height += (double)x[1];
+        sums.neighbours += sim->rows.neighbours[i];
+        sums.density_error += density[i] > 1.0f ? (double)(density[i] - 1.0f) : 0.0;
+        /* written so that a NaN stays */
+        sums.max_speed_sq = speed_sq <= sums.max_speed_sq ? sums.max_speed_sq : speed_sq;
+        sums.max_density = density[i] <= sums.max_density ? sums.max_density : density[i];
+    }
+    return sums;
+}
+
+static void summarise(SkiffSim *sim, const AdvanceSums *blocks, uint32_t block_count) {
+    AdvanceSums all = {0};
+    for (uint32_t block = 0; block < block_count; block++) {
+        const AdvanceSums *one = &blocks[block];
+        all.speed += one->speed;
+        all.height += one->height;
+        all.energy += one->energy;
+        all.density_error += one->density_error;
+        all.neighbours += one->neighbours;
+        for (int k = 0; k < 3; k++)
+            all.momentum[k] += one->momentum[k];
+        all.max_speed_sq = one->max_speed_sq <= all.max_speed_sq ? all.max_speed_sq : one->max_speed_sq;
+        all.max_density = one->max_density <= all.max_density ? all.max_density : one->max_density;
+    }
+    const double n = sim->particles.count > 0 ? sim->particles.count : 1.0;
+    const double mass = (double)sim->volume * (double)sim->params.rest_density;
+    SkiffStats *stats = &sim->stats;
+    stats->particles = sim->particles.count;
+    stats->contacts = sim->boundary.contact_count;
+    stats->mean_speed = all.speed / n;
+    stats->max_speed = sqrt((double)all.max_speed_sq);
+    stats->mean_height = all.height / n + sim->origin[1];
+    stats->kinetic_energy = 0.5 * mass * all.energy;
+    stats->potential_energy = -mass * (double)sim->params.gravity[1] * (all.height + n * sim->origin[1]);
+    stats->density_error_percent = 100.0 * all.density_error / n;
+    stats->density_max_percent = sim->particles.count > 0 ? 100.0 * ((double)all.max_density - 1.0) : 0.0;
+    stats->neighbours = all.neighbours / n;
+    for (int k = 0; k < 3; k++)
+        stats->momentum[k] = mass * all.momentum[k];
+}
+
+static void advance(SkiffSim *sim) {
+    const uint32_t blocks = particles_blocks(&sim->particles);
+    AdvanceSums *sums = sim->sums.data;
+#pragma omp parallel for schedule(static) num_threads(sim->threads)
+    for (uint32_t block = 0; block < blocks; block++)
+        sums[block] = advance_block(sim, block);
+    summarise(sim, sums, blocks);
+    const double dt = sim->params.time_step;
+    for (int b = 0; b < sim->body_count; b++)
+        body_advance(&sim->bodies[b], sim->time, dt);
+    sim->step++;
+    sim->time += dt;
+    sim->stats.step = sim->step;
+    sim->stats.time = sim->time;
+    sim->stats.dt = dt;
+}
+
+/* Finds the particle behind an impossible value: a slow path, taken once. */
+static bool report_fault(SkiffSim *sim, Err *err) {
+    const Particles *particles = &sim->particles;
+    for (uint32_t i = 0; i < particles->count; i++) {
+        const float *v = particles->velocity[i], *x = particles->position[i];
+        const double speed = sqrt((double)(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]));
+        const double density = (double)sim->rows.pairs.density[i];
+        if (speed <= (double)sim->params.speed_limit && density <= (double)sim->params.density_limit)
+            continue;
+        return err_set(err, ERR_DIVERGED,
+                       "particle %llu at (%.4g, %.4g, %.4g) m has speed %.4g m/s (limit %g) and density %.4g of rest "
+                       "(limit %g)",
+                       (unsigned long long)particles->id[i],
+                       (double)x[0] + sim->origin[0], (double)x[1] + sim->origin[1], (double)x[2] + sim->origin[2],
+                       speed, (double)sim->params.speed_limit, density, (double)sim->params.density_limit);
+    }
+    return true;
+}
+
+static bool check_bodies(const SkiffSim *sim, Err *err) {
+    for (int b = 0; b < sim->body_count; b++) {
+        double speed = 0.0;
+        for (int k = 0; k < 3; k++)
+            speed += sim->bodies[b].velocity[k] * sim->bodies[b].velocity[k];
+        speed = sqrt(speed);
+        if (!(speed <= (double)sim->params.speed_limit))
+            return err_set(err, ERR_DIVERGED, "body '%s' has speed %g m/s (limit %g)", sim->bodies[b].name, speed,
+                           (double)sim->params.speed_limit);
+    }
+    return true;
+}
+
+static bool check(SkiffSim *sim, Err *err) {
+    const SkiffStats *stats = &sim->stats;
+    const bool fine = stats->max_speed <= (double)sim->params.speed_limit &&
+                      stats->density_max_percent <= 100.0 * ((double)sim->params.density_limit - 1.0);
+    return (fine || report_fault(sim, err)) && check_bodies(sim, err);
+}
+
+/* Runs one phase, which sets `good`, and notes its time; after a failure the rest is skipped. */
+#define PHASE_RUN(id, call)                                                                                  \
+    if (good) {                                                                                              \
+        call;                                                                                                \
+        const double now = timer_ms();                                                                       \
+        sim->stats.phase_ms[SKIFF_PHASE_##id] = now - before;                                                \
+        before = now;                                                                                        \
+    }
+
+bool skiff_step(SkiffSim *sim, Err *err) {
+    double before = timer_ms();
+    const double begin = before;
+    bool good = true;
+    PHASE_RUN(EMIT, good = block_emit(sim, &sim->stats.emitted, err));
+    PHASE_RUN(BODIES, good = place_bodies(sim, err));
+    PHASE_RUN(SORT, good = sort_particles(sim, err));
+    PHASE_RUN(SEARCH, good = find_neighbours(sim, err));
+    PHASE_RUN(BOUNDARY, good = add_boundary(sim, err));
+    PHASE_RUN(DIVERGENCE, solve_divergence(sim));
+    PHASE_RUN(FORCES, apply_forces(sim));
+    PHASE_RUN(PRESSURE, solve_density(sim));
+    PHASE_RUN(ADVANCE, measure_forces(sim); advance(sim); good = check(sim, err));
+    sim->stats.step_ms = timer_ms() - begin;
+    if (!good)
+        err_prefix(err, "step %llu (t = %.6g s)", (unsigned long long)sim->step, sim->time);
+    return good;
+}
