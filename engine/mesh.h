@@ -12,7 +12,7 @@ typedef struct Mesh {
     uint32_t (*triangles)[3];
     uint32_t vertex_count;
     uint32_t triangle_count;
-    float min[3], max[3]; /* bounds of the referenced vertices */
+    float min[3], max[3];  /* bounds of the referenced vertices */
     struct MeshTree *tree; /* distance queries; built by mesh_build_tree */
 } Mesh;
 
@@ -25,35 +25,49 @@ typedef struct MeshMass {
     double inertia[3][3]; /* about the centre, m^5; multiply by the density for kg m^2 */
 } MeshMass;
 
-/* Reads v and f records (triangles and polygons, which are fanned; negative indices; v/vt/vn forms); other records are ignored.
- * ERR_INPUT with file:line on anything malformed: non-finite coordinates, index out of range, fewer than 3 corners. Vertices that
- * coincide exactly are merged, so that meshes with split normals are still closed. */
+/* Every maker of a mesh leaves *mesh all zero when it fails, so that mesh_free is always allowed.
+ *
+ * Reads v and f records (triangles and polygons, which are fanned from their first corner: they should be
+ * convex; negative indices; v/vt/vn forms); other records are ignored. ERR_INPUT with file:line on anything
+ * malformed: coordinates that are not finite or beyond 1e9, index out of range, fewer than 3 corners, a
+ * corner repeated. Vertices that coincide exactly are merged, so that meshes with split normals are still
+ * closed; triangles that collapse by it carry no surface and are left out. */
 bool mesh_load_obj(const char *path, Mesh *mesh, Err *err);
 bool mesh_parse_obj(const char *name, const char *text, size_t size, Mesh *mesh, Err *err);
 /* Axis-aligned box, 8 vertices, 12 triangles. */
 bool mesh_make_box(const float min[3], const float max[3], Mesh *mesh, Err *err);
-/* Icosphere of 20 * 4^level triangles with vertices on the sphere. */
+/* Icosphere of 20 * 4^level triangles with vertices on the sphere; level 0..8. */
 bool mesh_make_sphere(const float centre[3], float radius, int level, Mesh *mesh, Err *err);
-/* Convex polyhedron: points p with (p - point_k) . normal_k <= 0 for all k planes. ERR_INPUT when empty or unbounded. */
+/* Convex polyhedron: points p with (p - point_k) . normal_k <= 0 for all k planes (at most 1024; normals of
+ * any length > 0). Details below 1e-6 of the extent of the points are not resolved. ERR_INPUT when empty or
+ * unbounded. */
 bool mesh_make_planes(const float (*points)[3], const float (*normals)[3], int count, Mesh *mesh, Err *err);
 void mesh_free(Mesh *mesh);
 
-/* True if every edge joins exactly two triangles of opposite orientation, no triangle is degenerate and the volume is positive.
- * ERR_INPUT otherwise; the message names the mesh (`name`), the first faults with their vertices, and how many there are. A mesh turned
- * inside out (negative volume) is an error that says so. */
+/* True if every edge joins exactly two triangles of opposite orientation, no triangle is degenerate and the
+ * volume is positive. ERR_INPUT otherwise; the message names the mesh (`name`), the first faults with their
+ * vertices, and how many there are. A mesh turned inside out (negative volume) is an error that says so. */
 bool mesh_check_closed(const Mesh *mesh, const char *name, Err *err);
 
-/* Scales by `scale` per axis, then rotates by the unit quaternion (x, y, z, w), then translates. Rebuild the tree afterwards. A mirrored
- * scale (negative determinant) flips the triangles so that they still face outside. */
+/* Scales by `scale` per axis, then rotates by the unit quaternion (x, y, z, w), then translates. Rebuild the
+ * tree afterwards. A mirrored scale (negative determinant) flips the triangles so that they still face
+ * outside. The old tree is freed. */
 void mesh_transform(Mesh *mesh, const float scale[3], const float rotation[4], const float translation[3]);
 
 void mesh_mass(const Mesh *mesh, MeshMass *mass);
 
+/* The triangle across each side (side k runs from corner k to corner k + 1), triangle_count rows into memory
+ * of the caller. UINT32_MAX where the edge is open, joins more than two triangles or two that face opposite
+ * ways. ERR_INPUT without memory. */
+bool mesh_neighbours(const Mesh *mesh, uint32_t (*neighbours)[3], Err *err);
+
+/* Replaces an older tree. ERR_INPUT without triangles or memory. */
 bool mesh_build_tree(Mesh *mesh, Err *err);
-/* Signed distance in m, negative inside, exact for closed meshes (angle-weighted pseudo-normals, [Baerentzen & Aanaes 2005]).
- * Needs the tree. closest may be NULL. */
+void mesh_free_tree(Mesh *mesh);
+/* Signed distance in m, negative inside, exact for closed meshes (angle-weighted pseudo-normals, [Baerentzen
+ * & Aanaes 2005]). Needs the tree. closest may be NULL. */
 float mesh_distance(const Mesh *mesh, const float point[3], float closest[3]);
-/* Batch of the above. */
+/* Batch of the above, on all OpenMP threads; the same values. */
 void mesh_distances(const Mesh *mesh, const float (*points)[3], uint32_t count, float *distances);
 
 #endif
