@@ -1,0 +1,408 @@
+/* Finds the command, fills a CliArgs from its option table, prints help from the same tables, and turns an
+ * Err into messages and the exit code. */
+#include "cli.h"
+
+#include "commands.h"
+#include "nearest.h"
+#include "problems.h"
+#include "version.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define COUNT(table) ((int)(sizeof(table) / sizeof *(table)))
+
+typedef enum OptionType {
+    OPTION_FLAG,
+    OPTION_TEXT,
+    OPTION_NUMBER,
+    OPTION_INTEGER,
+    OPTION_CHOICE,
+    OPTION_EDIT
+} OptionType;
+
+typedef struct Option {
+    char letter; /* 0: none */
+    const char *name;
+    const char *value; /* what help calls its value */
+    OptionType type;
+    size_t offset; /* in CliArgs */
+    double min, max;
+    const char *names; /* choices "a|b|c" */
+    const char *help;
+} Option;
+
+typedef struct Command {
+    const char *name;
+    const char *arguments;
+    const char *summary;
+    const char *details;
+    const char *examples;
+    const Option *options;
+    int option_count;
+    bool (*run)(const CliArgs *args, Err *err);
+} Command;
+
+/* ---- The tables ---- */
+
+#define AT(member) .offset = offsetof(CliArgs, member)
+#define OPTION_ROWS_ENGINE                                                                                   \
+    {0,           "threads",                                                                                 \
+     "N",         OPTION_INTEGER,                                                                            \
+     AT(threads), .min = 1,                                                                                  \
+     .max = 1024, .help = "Threads (default: one for each core). The results do not depend on it"},          \
+    {                                                                                                        \
+        0, "simd", "ISA", OPTION_CHOICE, AT(simd),                                                           \
+            .names = "auto|plain|avx2|avx512",                                                               \
+            .help = "Instruction set: auto (default), plain, avx2 or avx512"                                 \
+    }
+#define OPTION_ROW_SET                                                                                       \
+    {                                                                                                        \
+        0, "set", "PATH=VALUE", OPTION_EDIT, AT(edits),                                                      \
+            .help = "Change a key of the scene, e.g. Configuration.viscosity=0.05, viscosity=0.05 for "      \
+                    "short, RigidBodies[0].density=300. Repeatable"                                          \
+    }
+#define OPTION_ROW_HELP                                                                                      \
+    { 'h', "help", NULL, OPTION_FLAG, AT(help), .help = "Show this help" }
+
+static const Option run_options[] = {
+    {'o', "output", "DIR", OPTION_TEXT, AT(output), .help = "Folder for the results, created; required"},
+    {'d', "duration", "S", OPTION_NUMBER, AT(duration), .min = 1e-6, .max = 1e6,
+     .help = "Simulated seconds, in place of the scene's"},
+    OPTION_ROWS_ENGINE,
+    OPTION_ROW_SET,
+    {'f', "force", NULL, OPTION_FLAG, AT(force), .help = "Replace the results in an existing folder"},
+    {'r', "resume", NULL, OPTION_FLAG, AT(resume), .help = "Go on from the folder's last checkpoint"},
+    {0, "checkpoint-every", "S", OPTION_NUMBER, AT(checkpoint_every), .min = 0, .max = 1e9,
+     .help = "Wall-clock seconds between checkpoints (default 120; 0: after every step)"},
+    {'q', "quiet", NULL, OPTION_FLAG, AT(quiet), .help = "No progress on stderr"},
+    OPTION_ROW_HELP,
+};
+
+static const Option check_options[] = {
+    {0, "schema", NULL, OPTION_FLAG, AT(schema),
+     .help = "Print the JSON schema of scene files, which lists every key"},
+    OPTION_ROWS_ENGINE,
+    OPTION_ROW_SET,
+    OPTION_ROW_HELP,
+};
+
+static const Option bench_options[] = {
+    {0, "settle", "S", OPTION_NUMBER, AT(settle), .min = 0, .max = 1e6,
+     .help = "Simulated seconds before the first measurement (default 1.2)"},
+    {0, "steps", "N", OPTION_INTEGER, AT(steps), .min = 1, .max = 1e6,
+     .help = "Steps of a window (default 20)"},
+    {0, "windows", "N", OPTION_INTEGER, AT(windows), .min = 1, .max = 1e4, .help = "Windows (default 5)"},
+    {0, "json", NULL, OPTION_FLAG, AT(json), .help = "One line of JSON in place of the table"},
+    OPTION_ROWS_ENGINE,
+    OPTION_ROW_SET,
+    {0, "results", "DIR", OPTION_TEXT, AT(results),
+     .help = "Append a row to DIR/<scene>.csv (default: tests/bench/results of the source tree that the "
+             "scene is in)"},
+    {0, "no-results", NULL, OPTION_FLAG, AT(no_results), .help = "Append no row"},
+    {'q', "quiet", NULL, OPTION_FLAG, AT(quiet), .help = "No progress on stderr"},
+    OPTION_ROW_HELP,
+};
+
+static const Command commands[] = {
+    {"run", "SCENE -o DIR", "Simulate a scene and write its results into a folder",
+     "The folder receives report.html (charts; open it in a browser), summary.json, steps.csv, hull.csv "
+     "(bodies),\n"
+     "probes.csv, scene.json (the scene with every default filled in) and state.skiff (checkpoint).\n"
+     "Ctrl-C finishes the step, writes a checkpoint and the report, and exits with 130; --resume goes on "
+     "from there.\n",
+     "  skiff run assets/scenes/settling-tank.json -o out/tank\n"
+     "  skiff run assets/scenes/dam-body.json -o out/dam --duration 2 --set RigidBodies[0].density=300\n"
+     "  skiff run assets/scenes/dam-body.json -o out/dam --resume --duration 4\n",
+     run_options, COUNT(run_options), run_command},
+    {"check", "SCENE", "Check a scene and show what it means",
+     "Reports every problem of the file, with its place, the values allowed and the nearest name. A good "
+     "scene is printed to\n"
+     "stdout as JSON with every default filled in; counts, bodies and memory follow on stderr. Writes no "
+     "file.\n",
+     "  skiff check assets/scenes/floating-box.json\n"
+     "  skiff check scene.json --set particleRadius=0.02 > effective.json\n"
+     "  skiff check --schema > scene.schema.json\n",
+     check_options, COUNT(check_options), check_command},
+    {"bench", "SCENE", "Measure the time of a step",
+     "Lets the scene settle, then times windows of steps and prints the median over the windows: ms for each "
+     "phase, iterations,\n"
+     "particles a second, and the errors reached. Appends a row to the scene's CSV file of results.\n",
+     "  skiff bench assets/scenes/bench-tank.json\n"
+     "  skiff bench assets/scenes/bench-dam.json --settle 0 --steps 95 --windows 7 --json\n",
+     bench_options, COUNT(bench_options), bench_command},
+};
+
+/* ---- Help ---- */
+
+/* Prints text broken at spaces to `width` columns, the lines after the first indented. */
+static void print_wrapped(const char *text, int indent, int width) {
+    int column = indent;
+    while (*text) {
+        int count = (int)strcspn(text, " ");
+        if (column > indent && column + 1 + count > width) {
+            printf("\n%*s", indent, "");
+            column = indent;
+        } else if (column > indent) {
+            putchar(' ');
+            column++;
+        }
+        printf("%.*s", count, text);
+        column += count;
+        text += count + (text[count] == ' ');
+    }
+    putchar('\n');
+}
+
+static void print_main_help(void) {
+    printf("skiff %s: particle water around moving bodies (SPH)\n\nUsage:\n", SKIFF_VERSION);
+    for (int i = 0; i < COUNT(commands); i++) {
+        char usage[64];
+        snprintf(usage, sizeof usage, "skiff %s %s", commands[i].name, commands[i].arguments);
+        printf("  %-26s %s\n", usage, commands[i].summary);
+    }
+    printf("  %-26s %s\n", "skiff help [COMMAND]", "Show help, with every option of a command");
+    printf("  %-26s %s\n", "skiff --version", "Show version, commit and compiler");
+    fputs("\nScenes are JSON files; assets/scenes has examples and `skiff check --schema` lists every key.\n"
+          "\nExamples:\n"
+          "  skiff run assets/scenes/settling-tank.json -o out/tank     then open out/tank/report.html\n"
+          "  skiff check assets/scenes/floating-box.json\n"
+          "  skiff bench assets/scenes/bench-tank.json --json\n"
+          "\nExit codes: 0 ok, 2 usage, 3 bad input, 5 diverged, 6 reading or writing failed, 130 "
+          "interrupted.\n",
+          stdout);
+}
+
+static void print_command_help(const Command *command) {
+    printf("skiff %s: %s\n\nUsage: skiff %s %s [OPTION]...\n\n%s\nOptions:\n", command->name,
+           command->summary, command->name, command->arguments, command->details);
+    for (int i = 0; i < command->option_count; i++) {
+        const Option *option = &command->options[i];
+        char letter[8] = "    ", usage[64];
+        if (option->letter)
+            snprintf(letter, sizeof letter, "-%c, ", option->letter);
+        snprintf(usage, sizeof usage, "%s--%s%s%s", letter, option->name, option->value ? " " : "",
+                 option->value ? option->value : "");
+        printf("  %-25s ", usage);
+        print_wrapped(option->help, 28, 110);
+    }
+    printf("\nExamples:\n%s", command->examples);
+}
+
+static void print_version(void) {
+    printf("skiff %s\ncommit %s\nbuilt by %s\n", SKIFF_VERSION, SKIFF_COMMIT, SKIFF_COMPILER);
+}
+
+/* ---- Parsing ---- */
+
+static const Option *find_option(const Command *command, const char *name, size_t count) {
+    for (int i = 0; i < command->option_count; i++)
+        if (strlen(command->options[i].name) == count && memcmp(command->options[i].name, name, count) == 0)
+            return &command->options[i];
+    return NULL;
+}
+
+static const Option *find_letter(const Command *command, char letter) {
+    for (int i = 0; i < command->option_count; i++)
+        if (letter && command->options[i].letter == letter)
+            return &command->options[i];
+    return NULL;
+}
+
+static bool unknown_option(const Command *command, const char *argument, Err *err) {
+    char name[64], quoted[64];
+    snprintf(name, sizeof name, "%.*s", (int)strcspn(argument, "="), argument);
+    Nearest nearest = nearest_begin(name + (name[1] == '-' ? 2 : 1));
+    for (int i = 0; i < command->option_count; i++)
+        nearest_offer(&nearest, command->options[i].name);
+    const char *best = nearest_result(&nearest);
+    problems_quote(quoted, sizeof quoted, name);
+    return err_set(err, ERR_USAGE, "unknown option %s%s%s%s", quoted, best ? ", did you mean --" : "",
+                   best ? best : "", best ? "?" : "");
+}
+
+static bool set_number(const Option *option, const char *text, CliArgs *args, Err *err) {
+    char *end;
+    double value = strtod(text, &end);
+    bool whole = option->type == OPTION_NUMBER || value == floor(value);
+    if (end == text || *end != '\0' || !isfinite(value) || !whole || value < option->min ||
+        value > option->max)
+        return err_set(err, ERR_USAGE, "--%s: expected %s from %g to %g, found \"%.80s\"", option->name,
+                       option->type == OPTION_NUMBER ? "a number" : "an integer", option->min, option->max,
+                       text);
+    void *member = (char *)args + option->offset;
+    if (option->type == OPTION_NUMBER)
+        *(double *)member = value;
+    else
+        *(int *)member = (int)value;
+    return true;
+}
+
+static bool set_choice(const Option *option, const char *text, CliArgs *args, Err *err) {
+    int index = 0;
+    Nearest nearest = nearest_begin(text);
+    for (const char *name = option->names; *name; index++) {
+        size_t count = strcspn(name, "|");
+        if (strlen(text) == count && memcmp(text, name, count) == 0) {
+            *(int *)(void *)((char *)args + option->offset) = index;
+            return true;
+        }
+        name += count + (name[count] == '|');
+    }
+    nearest_offer_list(&nearest, option->names);
+    const char *best = nearest_result(&nearest);
+    return err_set(err, ERR_USAGE, "--%s: expected %s, found \"%.80s\"%s%s%s", option->name, option->names,
+                   text, best ? ", did you mean " : "", best ? best : "", best ? "?" : "");
+}
+
+static bool set_option(const Option *option, const char *text, CliArgs *args, Err *err) {
+    void *member = (char *)args + option->offset;
+    switch (option->type) {
+    case OPTION_FLAG:
+        *(bool *)member = true;
+        return true;
+    case OPTION_TEXT:
+        if (!*text)
+            return err_set(err, ERR_USAGE, "--%s: the value is empty", option->name);
+        *(const char **)member = text;
+        return true;
+    case OPTION_NUMBER:
+    case OPTION_INTEGER:
+        return set_number(option, text, args, err);
+    case OPTION_CHOICE:
+        return set_choice(option, text, args, err);
+    case OPTION_EDIT:
+        if (args->edit_count == CLI_MAX_EDITS)
+            return err_set(err, ERR_USAGE, "--set: given more than %d times", CLI_MAX_EDITS);
+        args->edits[args->edit_count++] = text;
+        return true;
+    }
+    return false;
+}
+
+/* Handles argv[*i], which begins with '-', and its value. */
+static bool parse_option(const Command *command, int argc, char **argv, int *i, CliArgs *args, Err *err) {
+    const char *argument = argv[*i], *value = NULL;
+    const Option *option;
+    if (argument[1] == '-') {
+        size_t count = strcspn(argument + 2, "=");
+        option = find_option(command, argument + 2, count);
+        value = argument[2 + count] == '=' ? argument + 2 + count + 1 : NULL;
+    } else {
+        option = find_letter(command, argument[1]);
+        value = argument[2] != '\0' ? argument + 2 : NULL;
+    }
+    if (!option)
+        return unknown_option(command, argument, err);
+    if (option->type == OPTION_FLAG && value)
+        return err_set(err, ERR_USAGE, "--%s takes no value", option->name);
+    if (option->type != OPTION_FLAG && !value) {
+        if (*i + 1 >= argc)
+            return err_set(err, ERR_USAGE, "--%s: %s is missing", option->name, option->value);
+        value = argv[++*i];
+    }
+    return set_option(option, value, args, err);
+}
+
+static bool parse(const Command *command, int argc, char **argv, CliArgs *args, Err *err) {
+    bool only_arguments = false;
+    for (int i = 0; i < argc; i++) {
+        if (!only_arguments && strcmp(argv[i], "--") == 0) {
+            only_arguments = true;
+        } else if (!only_arguments && argv[i][0] == '-' && argv[i][1] != '\0') {
+            if (!parse_option(command, argc, argv, &i, args, err))
+                return false;
+        } else if (args->scene) {
+            return err_set(err, ERR_USAGE, "one scene at a time: \"%.200s\" and \"%.200s\" are given",
+                           args->scene, argv[i]);
+        } else {
+            args->scene = argv[i];
+        }
+    }
+    if (!args->scene && !args->help && !args->schema)
+        return err_set(err, ERR_USAGE, "the scene is missing");
+    return true;
+}
+
+static CliArgs default_args(void) {
+    return (CliArgs){.duration = NAN, .checkpoint_every = 120, .settle = 1.2, .steps = 20, .windows = 5};
+}
+
+/* ---- Running ---- */
+
+static const Command *find_command(const char *name) {
+    for (int i = 0; i < COUNT(commands); i++)
+        if (strcmp(commands[i].name, name) == 0)
+            return &commands[i];
+    return NULL;
+}
+
+static int unknown_command(const char *name) {
+    char quoted[64];
+    Nearest nearest = nearest_begin(name);
+    for (int i = 0; i < COUNT(commands); i++)
+        nearest_offer(&nearest, commands[i].name);
+    nearest_offer(&nearest, "help");
+    const char *best = nearest_result(&nearest);
+    problems_quote(quoted, sizeof quoted, name);
+    fprintf(stderr, "skiff: unknown command %s%s%s%s\nTry 'skiff --help'.\n", quoted,
+            best ? ", did you mean " : "", best ? best : "", best ? "?" : "");
+    return ERR_USAGE;
+}
+
+/* Output that did not reach its reader is a failure too. */
+static int finish(int code) {
+    if (fflush(stdout) == 0 && !ferror(stdout))
+        return code;
+    fprintf(stderr, "skiff: writing to stdout failed: %s\n", strerror(errno));
+    return ERR_IO;
+}
+
+static int run_one(const Command *command, int argc, char **argv) {
+    CliArgs args = default_args();
+    Err err = {0};
+    if (!parse(command, argc, argv, &args, &err)) {
+        fprintf(stderr, "skiff %s: %s\nTry 'skiff %s --help'.\n", command->name, err.message, command->name);
+        return ERR_USAGE;
+    }
+    if (args.help) {
+        print_command_help(command);
+        return finish(ERR_NONE);
+    }
+    if (command->run(&args, &err))
+        return finish(ERR_NONE);
+    fflush(stdout);
+    if (err.code == ERR_USAGE)
+        fprintf(stderr, "skiff %s: ", command->name);
+    fprintf(stderr, "%s\n", err.message);
+    return (int)err.code;
+}
+
+int cli_main(int argc, char **argv) {
+    if (argc < 2) {
+        fputs("skiff: a command is missing\nTry 'skiff --help'.\n", stderr);
+        return ERR_USAGE;
+    }
+    const char *name = argv[1];
+    if (strcmp(name, "--version") == 0 || strcmp(name, "-V") == 0) {
+        print_version();
+        return finish(ERR_NONE);
+    }
+    bool is_help = strcmp(name, "help") == 0;
+    if (strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0 || (is_help && argc < 3)) {
+        print_main_help();
+        return finish(ERR_NONE);
+    }
+    const Command *command = find_command(is_help ? argv[2] : name);
+    if (!command)
+        return unknown_command(is_help ? argv[2] : name);
+    if (is_help) {
+        print_command_help(command);
+        return finish(ERR_NONE);
+    }
+    return run_one(command, argc - 2, argv + 2);
+}

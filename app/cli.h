@@ -1,0 +1,31 @@
+/* The command line: one table of commands, one table of options for each. */
+#ifndef SKIFF_APP_CLI_H
+#define SKIFF_APP_CLI_H
+
+#include "engine/skiff.h"
+
+enum { CLI_MAX_EDITS = 64 };
+
+/* What the command line said. Options that a command does not have keep their defaults. */
+typedef struct CliArgs {
+    const char *scene;                /* NULL where it may be left out and was */
+    const char *output;               /* -o; NULL: not given */
+    double duration;                  /* s; NaN: the scene's */
+    int threads;                      /* 0: one for each core */
+    int simd;                         /* SkiffSimd */
+    const char *edits[CLI_MAX_EDITS]; /* --set, in order */
+    int edit_count;
+    bool force, resume, quiet;
+    double checkpoint_every; /* s of wall time */
+    bool schema;             /* check */
+    double settle;           /* bench, s */
+    int steps, windows;
+    bool json, no_results;
+    const char *results; /* NULL: the source tree's */
+    bool help;
+} CliArgs;
+
+/* Runs the program. Returns its exit code. */
+int cli_main(int argc, char **argv);
+
+#endif

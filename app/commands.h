@@ -1,0 +1,12 @@
+/* The commands of the program, each in the file of its name. Results go to stdout, progress to stderr;
+ * err->code becomes the exit code. */
+#ifndef SKIFF_APP_COMMANDS_H
+#define SKIFF_APP_COMMANDS_H
+
+#include "cli.h"
+
+bool run_command(const CliArgs *args, Err *err);
+bool check_command(const CliArgs *args, Err *err);
+bool bench_command(const CliArgs *args, Err *err);
+
+#endif

@@ -1,0 +1,392 @@
+/* Every key of a scene file, once. Keys, meanings and units follow SPlisHSPlasH scenes where there is such a
+ * thing; keys of Configuration that set the simulation come from the engine's own list (engine/params.inl).
+ */
+#include "scene_table.h"
+
+#include <math.h>
+#include <string.h>
+
+#define COUNT(table) ((int)(sizeof(table) / sizeof *(table)))
+#define COORDINATE   .min = -1e5, .max = 1e5, .unit = "m"
+#define LENGTH       .min = 1e-4, .max = 1e5, .unit = "m"
+#define SPEED        .min = -1e4, .max = 1e4, .unit = "m/s"
+#define DURATION     .min = 0, .max = 1e6, .unit = "s"
+
+static void set3(float out[3], float x, float y, float z) {
+    out[0] = x;
+    out[1] = y;
+    out[2] = z;
+}
+
+static bool is_given(const float vector[3]) {
+    return !isnan(vector[0]);
+}
+
+static void check_corners(const float min[3], const float max[3], const char *min_key, const char *max_key,
+                          Problems *problems) {
+    for (int k = 0; k < 3; k++)
+        if (!(max[k] > min[k])) {
+            size_t mark = problems_enter(problems, max_key);
+            problems_enter_index(problems, (size_t)k);
+            problems_add(problems, "%g is not above %s[%d], which is %g", (double)max[k], min_key, k,
+                         (double)min[k]);
+            problems_leave(problems, mark);
+        }
+}
+
+/* ---- Configuration ---- */
+
+static void init_configuration(void *object) {
+    SkiffDef def = skiff_def_default();
+    SceneConfiguration *configuration = object;
+    *configuration = (SceneConfiguration){.params = def.params, .duration = 10, .start_time = def.start_time};
+    set3(configuration->domain_min, NAN, NAN, NAN);
+    set3(configuration->domain_max, NAN, NAN, NAN);
+}
+
+static void check_configuration(void *object, Problems *problems) {
+    const SceneConfiguration *configuration = object;
+    if (is_given(configuration->domain_min) != is_given(configuration->domain_max))
+        problems_add(problems, "domainMin and domainMax go together, one of them is missing");
+    else if (is_given(configuration->domain_min))
+        check_corners(configuration->domain_min, configuration->domain_max, "domainMin", "domainMax",
+                      problems);
+}
+
+static bool param_row(int index, Field *field) {
+    static const FieldType types[] = {[SKIFF_FLOAT] = FIELD_FLOAT,
+                                      [SKIFF_INT] = FIELD_INT,
+                                      [SKIFF_BOOL] = FIELD_BOOL,
+                                      [SKIFF_VEC3] = FIELD_VEC3,
+                                      [SKIFF_ENUM] = FIELD_ENUM};
+    int count;
+    const SkiffParamInfo *infos = skiff_param_infos(&count);
+    if (index >= count)
+        return false;
+    const SkiffParamInfo *info = &infos[index];
+    *field = (Field){.key = info->key,
+                     .type = types[info->type],
+                     .offset = offsetof(SceneConfiguration, params) + info->offset,
+                     .min = info->min,
+                     .max = info->max,
+                     .unit = info->unit,
+                     .names = info->names,
+                     .help = info->help};
+    return true;
+}
+
+#define ROW(field_type, struct_type, member, json_key)                                                       \
+    .key = json_key, .type = field_type, .offset = offsetof(struct_type, member)
+
+static const Field configuration_fields[] = {
+    {ROW(FIELD_DOUBLE, SceneConfiguration, duration, "duration"), .min = 1e-6, .max = 1e6, .unit = "s",
+     .help = "Simulated time"},
+    {ROW(FIELD_DOUBLE, SceneConfiguration, start_time, "startTime"), .min = -1e6, .max = 1e6, .unit = "s",
+     .help = "Time at the start"},
+    {ROW(FIELD_DOUBLE, SceneConfiguration, probe_rate, "probeRate"), .min = 0, .max = 1e6, .unit = "Hz",
+     .help = "Rows of probes.csv a second; 0 is one every step"},
+    {ROW(FIELD_VEC3, SceneConfiguration, domain_min, "domainMin"), COORDINATE, .flags = FIELD_NULLABLE,
+     .help = "Corner of the domain that particles must not leave; absent: bounds of everything, grown"},
+    {ROW(FIELD_VEC3, SceneConfiguration, domain_max, "domainMax"), COORDINATE, .flags = FIELD_NULLABLE,
+     .help = "The corner opposite to domainMin"},
+};
+
+static const ObjectType configuration_type = {.help = "Settings of the simulation",
+                                              .fields = configuration_fields,
+                                              .field_count = COUNT(configuration_fields),
+                                              .more = param_row,
+                                              .size = sizeof(SceneConfiguration),
+                                              .init = init_configuration,
+                                              .check = check_configuration};
+
+/* ---- Placement, shared by tanks and bodies ---- */
+
+#define PLACEMENT_ROWS(struct_type, mask)                                                                    \
+    {ROW(FIELD_VEC3, struct_type, placement.scale, "scale"), .min = 1e-6, .max = 1e6, .variants = mask,      \
+     .help = "Factor along each axis, applied first"},                                                       \
+        {ROW(FIELD_VEC3, struct_type, placement.rotation_axis, "rotationAxis"), .min = -1e6, .max = 1e6,     \
+         .variants = mask, .help = "Axis of the rotation, applied after the scale"},                         \
+        {ROW(FIELD_FLOAT, struct_type, placement.rotation_angle, "rotationAngle"),                           \
+         .min = -1e3,                                                                                        \
+         .max = 1e3,                                                                                         \
+         .unit = "rad",                                                                                      \
+         .variants = mask,                                                                                   \
+         .help = "Angle of the rotation"},                                                                   \
+    {                                                                                                        \
+        ROW(FIELD_VEC3, struct_type, placement.translation, "translation"), COORDINATE,                      \
+            .variants = mask, .help = "Where its own origin is put, applied last"                            \
+    }
+
+static ScenePlacement default_placement(void) {
+    SkiffGeometryDef geometry = skiff_geometry_default();
+    ScenePlacement placement = {.rotation_angle = geometry.rotation_angle};
+    memcpy(placement.scale, geometry.scale, sizeof placement.scale);
+    memcpy(placement.translation, geometry.translation, sizeof placement.translation);
+    memcpy(placement.rotation_axis, geometry.rotation_axis, sizeof placement.rotation_axis);
+    return placement;
+}
+
+static void check_placement(const ScenePlacement *placement, Problems *problems) {
+    const float *axis = placement->rotation_axis;
+    if (placement->rotation_angle != 0 && axis[0] == 0 && axis[1] == 0 && axis[2] == 0) {
+        size_t mark = problems_enter(problems, "rotationAxis");
+        problems_add(problems, "has no direction, and rotationAngle is not 0");
+        problems_leave(problems, mark);
+    }
+}
+
+/* ---- Tank ---- */
+
+static void init_plane(void *object) {
+    *(ScenePlane *)object = (ScenePlane){0};
+}
+
+static void check_plane(void *object, Problems *problems) {
+    const ScenePlane *plane = object;
+    if (plane->normal[0] == 0 && plane->normal[1] == 0 && plane->normal[2] == 0) {
+        size_t mark = problems_enter(problems, "normal");
+        problems_add(problems, "has no direction");
+        problems_leave(problems, mark);
+    }
+}
+
+static const Field plane_fields[] = {
+    {ROW(FIELD_VEC3, ScenePlane, point, "point"), COORDINATE, .flags = FIELD_REQUIRED,
+     .help = "A point on the wall"},
+    {ROW(FIELD_VEC3, ScenePlane, normal, "normal"), .min = -1e6, .max = 1e6, .flags = FIELD_REQUIRED,
+     .help = "Points out of the tank; any length"},
+};
+
+static const ObjectType plane_type = {.help = "A flat wall",
+                                      .fields = plane_fields,
+                                      .field_count = COUNT(plane_fields),
+                                      .size = sizeof(ScenePlane),
+                                      .init = init_plane,
+                                      .check = check_plane};
+
+enum { BOX = 1 << SCENE_TANK_BOX, MESH = 1 << SCENE_TANK_MESH, PLANES = 1 << SCENE_TANK_PLANES };
+
+static void init_tank(void *object) {
+    SkiffTankDef tank = skiff_def_default().tank;
+    *(SceneTank *)object =
+        (SceneTank){.open = tank.open, .placement = default_placement(), .wet_height = tank.wet_height};
+}
+
+static void check_tank(void *object, Problems *problems) {
+    const SceneTank *tank = object;
+    if (tank->type == SCENE_TANK_BOX)
+        check_corners(tank->min, tank->max, "min", "max", problems);
+    if (tank->type == SCENE_TANK_MESH)
+        check_placement(&tank->placement, problems);
+    if (tank->type == SCENE_TANK_PLANES && tank->planes.count < 4) {
+        size_t mark = problems_enter(problems, "planes");
+        problems_add(problems, "%d planes cannot enclose a tank, expected at least 4", tank->planes.count);
+        problems_leave(problems, mark);
+    }
+}
+
+static const Field tank_fields[] = {
+    {ROW(FIELD_ENUM, SceneTank, type, "type"), .names = "box|mesh|planes", .flags = FIELD_REQUIRED,
+     .help = "What the walls are"},
+    {ROW(FIELD_VEC3, SceneTank, min, "min"), COORDINATE, .flags = FIELD_REQUIRED, .variants = BOX,
+     .help = "Corner of the box with the smallest coordinates"},
+    {ROW(FIELD_VEC3, SceneTank, max, "max"), COORDINATE, .flags = FIELD_REQUIRED, .variants = BOX,
+     .help = "Corner of the box with the largest coordinates"},
+    {ROW(FIELD_BOOL, SceneTank, open, "open"), .variants = BOX, .help = "No lid"},
+    {ROW(FIELD_FILE, SceneTank, file, "geometryFile"), .flags = FIELD_REQUIRED, .variants = MESH,
+     .help = "OBJ file of a closed mesh, relative to the scene; the fluid is inside it"},
+    PLACEMENT_ROWS(SceneTank, MESH),
+    {ROW(FIELD_LIST, SceneTank, planes, "planes"), .max = 1000, .flags = FIELD_REQUIRED, .variants = PLANES,
+     .object = &plane_type, .help = "Flat walls around a convex tank"},
+    {ROW(FIELD_FLOAT, SceneTank, wet_height, "wetHeight"), COORDINATE, .flags = FIELD_NULLABLE,
+     .help = "Only walls below this y feel the fluid; absent: all of them"},
+};
+
+static const ObjectType tank_type = {.help = "The walls around the fluid",
+                                     .fields = tank_fields,
+                                     .field_count = COUNT(tank_fields),
+                                     .size = sizeof(SceneTank),
+                                     .init = init_tank,
+                                     .check = check_tank,
+                                     .variant_key = "type"};
+
+/* ---- FluidBlocks ---- */
+
+static void init_block(void *object) {
+    *(SkiffBlockDef *)object = skiff_block_default();
+}
+
+static void check_block(void *object, Problems *problems) {
+    const SkiffBlockDef *block = object;
+    check_corners(block->start, block->end, "start", "end", problems);
+    if (block->repeat > 1 && !(block->period > 0)) {
+        size_t mark = problems_enter(problems, "period");
+        problems_add(problems, "expected a number above 0 s, since repeat is %d", block->repeat);
+        problems_leave(problems, mark);
+    }
+}
+
+static const Field block_fields[] = {
+    {ROW(FIELD_VEC3, SkiffBlockDef, start, "start"), COORDINATE, .flags = FIELD_REQUIRED,
+     .help = "Corner with the smallest coordinates; the first particle is half a spacing inside"},
+    {ROW(FIELD_VEC3, SkiffBlockDef, end, "end"), COORDINATE, .flags = FIELD_REQUIRED,
+     .help = "Corner with the largest coordinates; (end - start) / spacing particles along each axis"},
+    {ROW(FIELD_VEC3, SkiffBlockDef, velocity, "velocity"), SPEED, .help = "Velocity when emitted"},
+    {ROW(FIELD_DOUBLE, SkiffBlockDef, time, "time"), DURATION, .help = "When it is emitted; 0: at the start"},
+    {ROW(FIELD_DOUBLE, SkiffBlockDef, period, "period"), DURATION, .help = "Time between repetitions"},
+    {ROW(FIELD_INT, SkiffBlockDef, repeat, "repeat"), .min = 1, .max = 1e6,
+     .help = "How often it is emitted in all"},
+};
+
+static const ObjectType block_type = {.help = "A box of fluid, emitted once or periodically",
+                                      .fields = block_fields,
+                                      .field_count = COUNT(block_fields),
+                                      .size = sizeof(SkiffBlockDef),
+                                      .init = init_block,
+                                      .check = check_block};
+
+/* ---- RigidBodies ---- */
+
+enum { GROUP_SHAPE = 1, GROUP_WEIGHT = 2 };
+
+static void init_body(void *object) {
+    SkiffBodyDef def = skiff_body_default();
+    SceneBody *body = object;
+    *body = (SceneBody){.placement = default_placement(),
+                        .sphere = NAN,
+                        .density = NAN,
+                        .mass = NAN,
+                        .free_axes = UINT32_MAX,
+                        .release_time = def.release_time};
+    set3(body->box, NAN, NAN, NAN);
+    memcpy(body->velocity, def.velocity, sizeof body->velocity);
+    memcpy(body->angular_velocity, def.angular_velocity, sizeof body->angular_velocity);
+}
+
+static void check_body(void *object, Problems *problems) {
+    SceneBody *body = object;
+    check_placement(&body->placement, problems);
+    if (isnan(body->density) && isnan(body->mass))
+        body->density = skiff_body_default().density;
+    if (body->free_axes == UINT32_MAX)
+        body->free_axes = body->is_dynamic ? SKIFF_FREE_ALL : 0;
+    if (body->free_axes != 0 && !body->is_dynamic) {
+        size_t mark = problems_enter(problems, "freeAxes");
+        problems_add(problems, "has no meaning while isDynamic is false");
+        problems_leave(problems, mark);
+    }
+}
+
+static const Field body_fields[] = {
+    {ROW(FIELD_NAME, SceneBody, name, "name"), .flags = FIELD_REQUIRED,
+     .help = "Unique; begins its columns of hull.csv"},
+    {ROW(FIELD_FILE, SceneBody, file, "geometryFile"), .flags = FIELD_REQUIRED | FIELD_NULLABLE,
+     .group = GROUP_SHAPE, .help = "OBJ file of a closed mesh, relative to the scene"},
+    {ROW(FIELD_VEC3, SceneBody, box, "box"), LENGTH, .flags = FIELD_REQUIRED | FIELD_NULLABLE,
+     .group = GROUP_SHAPE, .help = "Edge lengths of a box around its own origin"},
+    {ROW(FIELD_FLOAT, SceneBody, sphere, "sphere"), LENGTH, .flags = FIELD_REQUIRED | FIELD_NULLABLE,
+     .group = GROUP_SHAPE, .help = "Radius of a sphere around its own origin"},
+    PLACEMENT_ROWS(SceneBody, 0),
+    {ROW(FIELD_FLOAT, SceneBody, density, "density"), .min = 1e-3, .max = 1e6, .unit = "kg/m^3",
+     .flags = FIELD_NULLABLE, .group = GROUP_WEIGHT,
+     .help = "Of the uniform solid; 1000 when mass is absent too"},
+    {ROW(FIELD_FLOAT, SceneBody, mass, "mass"), .min = 1e-9, .max = 1e12, .unit = "kg",
+     .flags = FIELD_NULLABLE, .group = GROUP_WEIGHT, .help = "In place of density"},
+    {ROW(FIELD_VEC3, SceneBody, velocity, "velocity"), SPEED,
+     .help = "Of the centre of mass at the start; kept along axes that are not free"},
+    {ROW(FIELD_VEC3, SceneBody, angular_velocity, "angularVelocity"), .min = -1e4, .max = 1e4,
+     .unit = "rad/s", .help = "About the world's axes at the start; kept about axes that are not free"},
+    {ROW(FIELD_BOOL, SceneBody, is_dynamic, "isDynamic"), .help = "Moved by the fluid and by gravity"},
+    {ROW(FIELD_FLAGS, SceneBody, free_axes, "freeAxes"), .names = "x|y|z|rx|ry|rz", .flags = FIELD_NULLABLE,
+     .help = "Axes along and about which a dynamic body can move; absent: all"},
+    {ROW(FIELD_DOUBLE, SceneBody, release_time, "releaseTime"), DURATION,
+     .help = "A dynamic body is held until then"},
+};
+
+static const ObjectType body_type = {.help = "A rigid body: floating, prescribed or fixed",
+                                     .fields = body_fields,
+                                     .field_count = COUNT(body_fields),
+                                     .size = sizeof(SceneBody),
+                                     .init = init_body,
+                                     .check = check_body};
+
+/* ---- Probes ---- */
+
+enum {
+    HEIGHT = 1 << SKIFF_PROBE_HEIGHT,
+    PRESSURE = 1 << SKIFF_PROBE_PRESSURE,
+    FORCE = 1 << SKIFF_PROBE_FORCE
+};
+
+static void init_probe(void *object) {
+    SceneProbe *probe = object;
+    *probe = (SceneProbe){0};
+    set3(probe->min, NAN, NAN, NAN);
+    set3(probe->max, NAN, NAN, NAN);
+}
+
+static void check_probe(void *object, Problems *problems) {
+    const SceneProbe *probe = object;
+    if (probe->type == SKIFF_PROBE_FORCE && !probe->object)
+        problems_add(problems, "object is missing, expected a body's name or \"tank\"");
+    if (is_given(probe->min) != is_given(probe->max))
+        problems_add(problems, "min and max go together, one of them is missing");
+    else if (is_given(probe->min))
+        check_corners(probe->min, probe->max, "min", "max", problems);
+}
+
+static const Field probe_fields[] = {
+    {ROW(FIELD_NAME, SceneProbe, name, "name"), .flags = FIELD_REQUIRED,
+     .help = "Unique; its column of probes.csv"},
+    {ROW(FIELD_ENUM, SceneProbe, type, "type"), .names = "height|pressure|force", .flags = FIELD_REQUIRED,
+     .help = "Wave gauge (m of water on a vertical line), wall pressure (Pa), or force (N) and torque (N m) "
+             "on an object"},
+    {ROW(FIELD_VEC3, SceneProbe, point, "point"), COORDINATE, .flags = FIELD_REQUIRED,
+     .variants = HEIGHT | PRESSURE, .help = "Where it is; heights ignore y"},
+    {ROW(FIELD_FLOAT, SceneProbe, radius, "radius"), .min = 0, .max = 1e5, .unit = "m", .variants = PRESSURE,
+     .help = "Mean over the wall within this distance; 0: support radius"},
+    {ROW(FIELD_NAME, SceneProbe, object, "object"), .flags = FIELD_NULLABLE, .variants = PRESSURE | FORCE,
+     .help = "A body's name or \"tank\"; a force needs one, a pressure without one takes any wall"},
+    {ROW(FIELD_VEC3, SceneProbe, min, "min"), COORDINATE, .flags = FIELD_NULLABLE, .variants = FORCE,
+     .help = "Only the part of the object inside [min, max] at the start"},
+    {ROW(FIELD_VEC3, SceneProbe, max, "max"), COORDINATE, .flags = FIELD_NULLABLE, .variants = FORCE,
+     .help = "The corner opposite to min"},
+};
+
+static const ObjectType probe_type = {.help = "A measurement, written to probes.csv",
+                                      .fields = probe_fields,
+                                      .field_count = COUNT(probe_fields),
+                                      .size = sizeof(SceneProbe),
+                                      .init = init_probe,
+                                      .check = check_probe,
+                                      .variant_key = "type"};
+
+/* ---- The file ---- */
+
+static void init_file(void *object) {
+    *(SceneFile *)object = (SceneFile){.version = 1, .title = "", .description = ""};
+}
+
+static const Field file_fields[] = {
+    {ROW(FIELD_TEXT, SceneFile, schema, "$schema"), .flags = FIELD_NULLABLE, .help = "For editors; not used"},
+    {ROW(FIELD_INT, SceneFile, version, "version"), .min = 1, .max = 1, .flags = FIELD_REQUIRED,
+     .help = "Version of the format"},
+    {ROW(FIELD_TEXT, SceneFile, title, "title"), .help = "Heads the report"},
+    {ROW(FIELD_TEXT, SceneFile, description, "description"), .help = "What the scene is for"},
+    {ROW(FIELD_OBJECT, SceneFile, configuration, "Configuration"), .object = &configuration_type,
+     .help = "Settings of the simulation"},
+    {ROW(FIELD_OBJECT, SceneFile, tank, "Tank"), .flags = FIELD_NULLABLE, .object = &tank_type,
+     .help = "The walls around the fluid; absent: none"},
+    {ROW(FIELD_LIST, SceneFile, blocks, "FluidBlocks"), .max = 100000, .object = &block_type,
+     .help = "The fluid"},
+    {ROW(FIELD_LIST, SceneFile, bodies, "RigidBodies"), .max = 10000, .object = &body_type,
+     .help = "Solids in the fluid; they do not touch each other or the tank"},
+    {ROW(FIELD_LIST, SceneFile, probes, "Probes"), .max = 10000, .object = &probe_type,
+     .help = "Measurements"},
+};
+
+const ObjectType scene_file_type = {.help = "A Skiff scene",
+                                    .fields = file_fields,
+                                    .field_count = COUNT(file_fields),
+                                    .size = sizeof(SceneFile),
+                                    .init = init_file};

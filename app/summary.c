@@ -1,0 +1,127 @@
+#include "summary.h"
+
+#include "json_text.h"
+
+#include "engine/base/arena.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define COUNT(table) ((int)(sizeof(table) / sizeof *(table)))
+
+/* Columns of steps.csv that are summarised, and under which name. Phases and the step itself join the group
+ * "ms". */
+static const struct {
+    const char *column, *group, *key;
+} rows[] = {
+    {"density_iterations", "iterations", "density"},
+    {"divergence_iterations", "iterations", "divergence"},
+    {"density_error_percent", "errors_percent", "density"},
+    {"density_max_percent", "errors_percent", "density_max"},
+    {"divergence_error_percent", "errors_percent", "divergence"},
+    {"residual_percent", "errors_percent", "residual"},
+    {"mean_speed", "speed", "mean"},
+    {"max_speed", "speed", "max"},
+    {"neighbours", "neighbours", NULL},
+};
+
+static int compare_doubles(const void *a, const void *b) {
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static double percentile(const double *sorted, size_t count, double percent) {
+    size_t rank = (size_t)ceil(percent / 100.0 * (double)count);
+    return sorted[rank > 0 ? rank - 1 : 0];
+}
+
+/* Six digits are more than any of these figures means. */
+static json_t *figure(double value) {
+    char text[32];
+    snprintf(text, sizeof text, "%.6g", value);
+    return json_text_double(strtod(text, NULL));
+}
+
+json_t *summary_statistics(double *values, size_t count) {
+    if (count == 0)
+        return json_null();
+    double sum = 0;
+    for (size_t i = 0; i < count; i++)
+        sum += values[i];
+    qsort(values, count, sizeof *values, compare_doubles);
+    return json_pack("{sososososo}", "mean", figure(sum / (double)count), "p50",
+                     figure(percentile(values, count, 50)), "p95", figure(percentile(values, count, 95)),
+                     "p99", figure(percentile(values, count, 99)), "max", figure(values[count - 1]));
+}
+
+double summary_real_time_factor(double simulated, double computed_ms) {
+    return computed_ms > 0 ? 1000.0 * simulated / computed_ms : NAN;
+}
+
+uint32_t summary_sample_count(const SkiffSim *sim) {
+    SkiffBoundary walls, bodies;
+    skiff_boundary_samples(sim, false, &walls);
+    skiff_boundary_samples(sim, true, &bodies);
+    return walls.count + bodies.count;
+}
+
+static void add_column(json_t *into, const char *key, const CsvTable *steps, const char *column) {
+    double *values = csv_copy_column(steps, column);
+    json_object_set_new(into, key, values ? summary_statistics(values, steps->row_count) : json_null());
+    free(values);
+}
+
+static json_t *milliseconds(const CsvTable *steps) {
+    json_t *group = json_object();
+    char column[64];
+    add_column(group, "step", steps, "step_ms");
+    for (int i = 0; i < SKIFF_PHASE_COUNT; i++) {
+        snprintf(column, sizeof column, "%s_ms", skiff_phase_key(i));
+        add_column(group, skiff_phase_key(i), steps, column);
+    }
+    return group;
+}
+
+static double column_sum(const CsvTable *steps, const char *name) {
+    double *values = csv_copy_column(steps, name), sum = 0;
+    for (size_t i = 0; values && i < steps->row_count; i++)
+        sum += values[i];
+    free(values);
+    return sum;
+}
+
+json_t *summary_make(const Scene *scene, const SkiffSim *sim, const CsvTable *steps, const RunEnd *end) {
+    const SkiffStats *stats = skiff_stats(sim);
+    Machine machine = machine_describe(sim);
+    char hash[20];
+    snprintf(hash, sizeof hash, "%016" PRIx64, skiff_hash(sim));
+    double computed_ms = column_sum(steps, "step_ms");
+    double simulated = skiff_time(sim) - scene->def.start_time;
+    json_t *summary = json_pack("{ssssssssso}", "scene", scene->file, "title", scene->title, "status",
+                                end->status, "message", end->message, "state_hash", json_string(hash));
+    json_object_set_new(summary, "steps", json_integer((json_int_t)skiff_step_count(sim)));
+    json_object_set_new(summary, "time", json_text_double(skiff_time(sim)));
+    json_object_set_new(summary, "time_step", json_text_float(skiff_params(sim)->time_step));
+    json_object_set_new(summary, "particles", json_integer(skiff_particles(sim).count));
+    json_object_set_new(summary, "boundary_samples", json_integer(summary_sample_count(sim)));
+    json_object_set_new(summary, "contacts", json_integer(stats->contacts));
+    json_object_set_new(summary, "bodies", json_integer(skiff_body_count(sim)));
+    json_object_set_new(summary, "computing_seconds", figure(computed_ms / 1000));
+    json_object_set_new(summary, "real_time_factor",
+                        figure(summary_real_time_factor(simulated, computed_ms)));
+    json_object_set_new(summary, "ms", milliseconds(steps));
+    for (int i = 0; i < COUNT(rows); i++) {
+        json_t *group = rows[i].key ? json_object_get(summary, rows[i].group) : summary;
+        if (!group) {
+            group = json_object();
+            json_object_set_new(summary, rows[i].group, group);
+        }
+        add_column(group, rows[i].key ? rows[i].key : rows[i].group, steps, rows[i].column);
+    }
+    json_object_set_new(summary, "memory_mb", figure((double)skiff_memory(sim) / 1e6));
+    json_object_set_new(summary, "peak_rss_mb", figure((double)memory_peak() / 1e6));
+    json_object_set_new(summary, "machine", machine_json(&machine));
+    return summary;
+}

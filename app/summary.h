@@ -1,0 +1,27 @@
+/* summary.json: what a run came to, from its steps.csv. */
+#ifndef SKIFF_APP_SUMMARY_H
+#define SKIFF_APP_SUMMARY_H
+
+#include "csv.h"
+#include "machine.h"
+#include "scene.h"
+
+typedef struct RunEnd {
+    const char *status; /* "finished", "interrupted" or "diverged" */
+    const char *message;
+} RunEnd;
+
+/* New reference. NULL when memory is exhausted. */
+json_t *summary_make(const Scene *scene, const SkiffSim *sim, const CsvTable *steps, const RunEnd *end);
+
+/* {"mean":, "p50":, "p95":, "p99":, "max":} of count values, whose order is lost. Percentiles by nearest
+ * rank. New reference. */
+json_t *summary_statistics(double *values, size_t count);
+
+/* Samples of walls and bodies. */
+uint32_t summary_sample_count(const SkiffSim *sim);
+
+/* Simulated seconds for each second of computing: 1 is real time, more is faster. */
+double summary_real_time_factor(double simulated, double computed_ms);
+
+#endif

@@ -1,0 +1,34 @@
+/* Line and area charts as inline SVG with an HTML legend. No scripts, no external files. */
+#ifndef SKIFF_APP_SVG_H
+#define SKIFF_APP_SVG_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdio.h>
+
+enum { SVG_MAX_SERIES = 12 };
+
+typedef struct SvgSeries {
+    const char *name;
+    const double *y; /* SvgChart.count values; NaN: no value there */
+} SvgSeries;
+
+typedef struct SvgChart {
+    const char *title, *x_label, *y_label; /* labels with their unit */
+    const double *x;                       /* rising */
+    size_t count;
+    SvgSeries series[SVG_MAX_SERIES];
+    int series_count;
+    bool is_stacked;     /* areas on top of each other, from 0 */
+    bool is_logarithmic; /* of base 10; values at or below 0 lie on the lower edge */
+    bool from_zero;      /* the axis includes 0 */
+} SvgChart;
+
+/* Writes a <figure>. Long series are shown as mean and, where they are not stacked, range of each of a few
+ * hundred intervals. */
+void svg_chart(FILE *out, const SvgChart *chart);
+
+/* Writes text with HTML's special characters escaped. */
+void svg_text(FILE *out, const char *text);
+
+#endif
