@@ -84,21 +84,33 @@ static bool has_meaning(const Field *field, unsigned variant) {
 
 /* ---- Reading ---- */
 
+static void report_unknown_key(const ObjectType *type, const char *key, FieldReader *reader) {
+    Field field;
+    char known[512] = "";
+    Nearest nearest = nearest_begin(key);
+    for (int i = 0; field_at(type, i, &field); i++) {
+        size_t used = strlen(known);
+        nearest_offer(&nearest, field.key);
+        snprintf(known + used, sizeof known - used, "%s%s", used > 0 ? ", " : "", field.key);
+    }
+    const char *best = nearest_result(&nearest);
+    size_t mark = problems_enter(reader->problems, key);
+    if (best)
+        problems_add(reader->problems, "unknown key, did you mean %s?", best);
+    else if (type->more)
+        problems_add(reader->problems, "unknown key; `skiff check --schema` lists all");
+    else
+        problems_add(reader->problems, "unknown key, expected one of %s", known);
+    problems_leave(reader->problems, mark);
+}
+
 static void report_unknown_keys(const ObjectType *type, const json_t *value, FieldReader *reader) {
     const char *key;
     json_t *item;
+    Field field;
     json_object_foreach((json_t *)(uintptr_t)value, key, item) {
-        Field field;
-        if (field_find(type, key, &field))
-            continue;
-        Nearest nearest = nearest_begin(key);
-        for (int i = 0; field_at(type, i, &field); i++)
-            nearest_offer(&nearest, field.key);
-        const char *best = nearest_result(&nearest);
-        size_t mark = problems_enter(reader->problems, key);
-        problems_add(reader->problems, "unknown key%s%s%s", best ? ", did you mean " : "", best ? best : "",
-                     best ? "?" : "");
-        problems_leave(reader->problems, mark);
+        if (!field_find(type, key, &field))
+            report_unknown_key(type, key, reader);
     }
 }
 
@@ -149,7 +161,7 @@ static void check_groups(const ObjectType *type, const json_t *value, FieldReade
 }
 
 static void check_presence(const ObjectType *type, const json_t *value, const void *object,
-                           const bool *failed, FieldReader *reader) {
+                           bool *failed, FieldReader *reader) {
     Field field;
     unsigned variant = variant_of(type, object);
     for (int i = 0; field_at(type, i, &field); i++)
@@ -161,17 +173,29 @@ static void check_presence(const ObjectType *type, const json_t *value, const vo
         size_t mark = problems_enter(reader->problems, field.key);
         if (item && variant != 0 && !has_meaning(&field, variant))
             report_unused(type, &field, object, reader);
-        if (!item && has_meaning(&field, variant) && (field.flags & FIELD_REQUIRED) && field.group == 0)
+        if (!item && has_meaning(&field, variant) && (field.flags & FIELD_REQUIRED) && field.group == 0) {
             report_missing(&field, reader);
+            failed[i] = true;
+        }
         problems_leave(reader->problems, mark);
     }
     check_groups(type, value, reader);
 }
 
+static void check_rules(const ObjectType *type, void *object, const bool *failed, FieldReader *reader) {
+    Field field;
+    for (int r = 0; r < type->rule_count; r++) {
+        bool can_ask = true;
+        for (int i = 0; field_at(type, i, &field); i++)
+            can_ask = can_ask && !(failed[i] && field_name_index(type->rules[r].keys, field.key) >= 0);
+        if (can_ask)
+            type->rules[r].check(object, reader->problems);
+    }
+}
+
 void field_read(const ObjectType *type, const json_t *value, void *object, FieldReader *reader) {
     Field field;
     bool failed[FIELD_MAX_COUNT] = {false};
-    int before = reader->problems->count;
     type->init(object);
     report_unknown_keys(type, value, reader);
     for (int i = 0; field_at(type, i, &field); i++) {
@@ -186,8 +210,7 @@ void field_read(const ObjectType *type, const json_t *value, void *object, Field
         failed[i] = reader->problems->count > count;
     }
     check_presence(type, value, object, failed, reader);
-    if (type->check && reader->problems->count == before)
-        type->check(object, reader->problems);
+    check_rules(type, object, failed, reader);
 }
 
 /* ---- Writing ---- */
@@ -213,8 +236,10 @@ json_t *field_write(const ObjectType *type, const void *object) {
 static json_t *schema_of_field(const Field *field, const void *defaults) {
     char help[512];
     json_t *schema = json_object();
-    snprintf(help, sizeof help, "%s%s%s", field->help, field->unit && *field->unit ? ", " : "",
-             field->unit ? field->unit : "");
+    if (field->unit && *field->unit)
+        snprintf(help, sizeof help, "%s (%s)", field->help, field->unit);
+    else
+        snprintf(help, sizeof help, "%s", field->help);
     field_type_row(field->type)->schema(field, schema);
     json_object_set_new(schema, "description", json_string(help));
     json_t *value = field_type_row(field->type)->write(field, member_of(field, defaults));

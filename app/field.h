@@ -57,6 +57,12 @@ typedef struct FieldList {
     int count;
 } FieldList;
 
+/* What concerns several keys at once. Not asked while one of them is missing or wrong. */
+typedef struct FieldRule {
+    const char *keys; /* "a|b" */
+    void (*check)(void *object, Problems *problems);
+} FieldRule;
+
 struct ObjectType {
     const char *help;
     const Field *fields;
@@ -65,7 +71,8 @@ struct ObjectType {
                  Field *field); /* rows after those of the table, made from another list; or NULL */
     size_t size;                /* of the struct */
     void (*init)(void *object);
-    void (*check)(void *object, Problems *problems); /* what no row can say; or NULL */
+    const FieldRule *rules;
+    int rule_count;
     const char *variant_key; /* key of the FIELD_ENUM that selects `variants`, or NULL */
 };
 

@@ -27,7 +27,9 @@ json_t *json_text_double(double value) {
 
 static void print_real(FILE *stream, double value) {
     char text[40];
-    for (int digits = 6; digits <= 17; digits++) {
+    bool is_whole = fabs(value) < 1e15 && value == floor(value);
+    snprintf(text, sizeof text, "%.0f", value);
+    for (int digits = 6; !is_whole && digits <= 17; digits++) {
         snprintf(text, sizeof text, "%.*g", digits, value);
         if (strtod(text, NULL) == value)
             break;

@@ -69,6 +69,6 @@ void nearest_offer_list(Nearest *nearest, const char *names) {
 }
 
 const char *nearest_result(const Nearest *nearest) {
-    size_t tolerated = (strlen(nearest->word) + 2) / 3;
+    size_t tolerated = (strlen(nearest->word) + 1) / 3;
     return nearest->distance <= tolerated ? nearest->best : NULL;
 }

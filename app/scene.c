@@ -239,8 +239,7 @@ SkiffSim *scene_start(const Scene *scene, int threads, SkiffSimd simd, Err *err)
 
 json_t *scene_effective(const Scene *scene) {
     json_t *effective = field_write(&scene_file_type, &scene->content->file);
-    if (json_is_null(json_object_get(effective, "$schema")))
-        json_object_del(effective, "$schema");
+    json_object_del(effective, "$schema"); /* relative to the file that it stood in */
     return effective;
 }
 

@@ -44,7 +44,7 @@ static void init_configuration(void *object) {
     set3(configuration->domain_max, NAN, NAN, NAN);
 }
 
-static void check_configuration(void *object, Problems *problems) {
+static void check_domain(void *object, Problems *problems) {
     const SceneConfiguration *configuration = object;
     if (is_given(configuration->domain_min) != is_given(configuration->domain_max))
         problems_add(problems, "domainMin and domainMax go together, one of them is missing");
@@ -91,13 +91,16 @@ static const Field configuration_fields[] = {
      .help = "The corner opposite to domainMin"},
 };
 
+static const FieldRule configuration_rules[] = {{"domainMin|domainMax", check_domain}};
+
 static const ObjectType configuration_type = {.help = "Settings of the simulation",
                                               .fields = configuration_fields,
                                               .field_count = COUNT(configuration_fields),
                                               .more = param_row,
                                               .size = sizeof(SceneConfiguration),
                                               .init = init_configuration,
-                                              .check = check_configuration};
+                                              .rules = configuration_rules,
+                                              .rule_count = COUNT(configuration_rules)};
 
 /* ---- Placement, shared by tanks and bodies ---- */
 
@@ -126,7 +129,7 @@ static ScenePlacement default_placement(void) {
     return placement;
 }
 
-static void check_placement(const ScenePlacement *placement, Problems *problems) {
+static void check_rotation(const ScenePlacement *placement, Problems *problems) {
     const float *axis = placement->rotation_axis;
     if (placement->rotation_angle != 0 && axis[0] == 0 && axis[1] == 0 && axis[2] == 0) {
         size_t mark = problems_enter(problems, "rotationAxis");
@@ -157,12 +160,15 @@ static const Field plane_fields[] = {
      .help = "Points out of the tank; any length"},
 };
 
+static const FieldRule plane_rules[] = {{"normal", check_plane}};
+
 static const ObjectType plane_type = {.help = "A flat wall",
                                       .fields = plane_fields,
                                       .field_count = COUNT(plane_fields),
                                       .size = sizeof(ScenePlane),
                                       .init = init_plane,
-                                      .check = check_plane};
+                                      .rules = plane_rules,
+                                      .rule_count = COUNT(plane_rules)};
 
 enum { BOX = 1 << SCENE_TANK_BOX, MESH = 1 << SCENE_TANK_MESH, PLANES = 1 << SCENE_TANK_PLANES };
 
@@ -172,12 +178,19 @@ static void init_tank(void *object) {
         (SceneTank){.open = tank.open, .placement = default_placement(), .wet_height = tank.wet_height};
 }
 
-static void check_tank(void *object, Problems *problems) {
+static void check_tank_box(void *object, Problems *problems) {
     const SceneTank *tank = object;
     if (tank->type == SCENE_TANK_BOX)
         check_corners(tank->min, tank->max, "min", "max", problems);
-    if (tank->type == SCENE_TANK_MESH)
-        check_placement(&tank->placement, problems);
+}
+
+static void check_tank_rotation(void *object, Problems *problems) {
+    const SceneTank *tank = object;
+    check_rotation(&tank->placement, problems);
+}
+
+static void check_tank_planes(void *object, Problems *problems) {
+    const SceneTank *tank = object;
     if (tank->type == SCENE_TANK_PLANES && tank->planes.count < 4) {
         size_t mark = problems_enter(problems, "planes");
         problems_add(problems, "%d planes cannot enclose a tank, expected at least 4", tank->planes.count);
@@ -202,12 +215,17 @@ static const Field tank_fields[] = {
      .help = "Only walls below this y feel the fluid; absent: all of them"},
 };
 
+static const FieldRule tank_rules[] = {{"type|min|max", check_tank_box},
+                                       {"rotationAxis|rotationAngle", check_tank_rotation},
+                                       {"type|planes", check_tank_planes}};
+
 static const ObjectType tank_type = {.help = "The walls around the fluid",
                                      .fields = tank_fields,
                                      .field_count = COUNT(tank_fields),
                                      .size = sizeof(SceneTank),
                                      .init = init_tank,
-                                     .check = check_tank,
+                                     .rules = tank_rules,
+                                     .rule_count = COUNT(tank_rules),
                                      .variant_key = "type"};
 
 /* ---- FluidBlocks ---- */
@@ -216,9 +234,13 @@ static void init_block(void *object) {
     *(SkiffBlockDef *)object = skiff_block_default();
 }
 
-static void check_block(void *object, Problems *problems) {
+static void check_block_corners(void *object, Problems *problems) {
     const SkiffBlockDef *block = object;
     check_corners(block->start, block->end, "start", "end", problems);
+}
+
+static void check_block_period(void *object, Problems *problems) {
+    const SkiffBlockDef *block = object;
     if (block->repeat > 1 && !(block->period > 0)) {
         size_t mark = problems_enter(problems, "period");
         problems_add(problems, "expected a number above 0 s, since repeat is %d", block->repeat);
@@ -238,12 +260,16 @@ static const Field block_fields[] = {
      .help = "How often it is emitted in all"},
 };
 
+static const FieldRule block_rules[] = {{"start|end", check_block_corners},
+                                        {"period|repeat", check_block_period}};
+
 static const ObjectType block_type = {.help = "A box of fluid, emitted once or periodically",
                                       .fields = block_fields,
                                       .field_count = COUNT(block_fields),
                                       .size = sizeof(SkiffBlockDef),
                                       .init = init_block,
-                                      .check = check_block};
+                                      .rules = block_rules,
+                                      .rule_count = COUNT(block_rules)};
 
 /* ---- RigidBodies ---- */
 
@@ -263,11 +289,20 @@ static void init_body(void *object) {
     memcpy(body->angular_velocity, def.angular_velocity, sizeof body->angular_velocity);
 }
 
-static void check_body(void *object, Problems *problems) {
+static void check_body_rotation(void *object, Problems *problems) {
+    const SceneBody *body = object;
+    check_rotation(&body->placement, problems);
+}
+
+static void fill_body_weight(void *object, Problems *problems) {
     SceneBody *body = object;
-    check_placement(&body->placement, problems);
+    (void)problems;
     if (isnan(body->density) && isnan(body->mass))
         body->density = skiff_body_default().density;
+}
+
+static void check_body_axes(void *object, Problems *problems) {
+    SceneBody *body = object;
     if (body->free_axes == UINT32_MAX)
         body->free_axes = body->is_dynamic ? SKIFF_FREE_ALL : 0;
     if (body->free_axes != 0 && !body->is_dynamic) {
@@ -303,12 +338,17 @@ static const Field body_fields[] = {
      .help = "A dynamic body is held until then"},
 };
 
+static const FieldRule body_rules[] = {{"rotationAxis|rotationAngle", check_body_rotation},
+                                       {"density|mass", fill_body_weight},
+                                       {"isDynamic|freeAxes", check_body_axes}};
+
 static const ObjectType body_type = {.help = "A rigid body: floating, prescribed or fixed",
                                      .fields = body_fields,
                                      .field_count = COUNT(body_fields),
                                      .size = sizeof(SceneBody),
                                      .init = init_body,
-                                     .check = check_body};
+                                     .rules = body_rules,
+                                     .rule_count = COUNT(body_rules)};
 
 /* ---- Probes ---- */
 
@@ -325,10 +365,17 @@ static void init_probe(void *object) {
     set3(probe->max, NAN, NAN, NAN);
 }
 
-static void check_probe(void *object, Problems *problems) {
+static void check_probe_object(void *object, Problems *problems) {
     const SceneProbe *probe = object;
-    if (probe->type == SKIFF_PROBE_FORCE && !probe->object)
-        problems_add(problems, "object is missing, expected a body's name or \"tank\"");
+    if (probe->type == SKIFF_PROBE_FORCE && !probe->object) {
+        size_t mark = problems_enter(problems, "object");
+        problems_add(problems, "missing, expected a body's name or \"tank\"");
+        problems_leave(problems, mark);
+    }
+}
+
+static void check_probe_region(void *object, Problems *problems) {
+    const SceneProbe *probe = object;
     if (is_given(probe->min) != is_given(probe->max))
         problems_add(problems, "min and max go together, one of them is missing");
     else if (is_given(probe->min))
@@ -353,12 +400,15 @@ static const Field probe_fields[] = {
      .help = "The corner opposite to min"},
 };
 
+static const FieldRule probe_rules[] = {{"type|object", check_probe_object}, {"min|max", check_probe_region}};
+
 static const ObjectType probe_type = {.help = "A measurement, written to probes.csv",
                                       .fields = probe_fields,
                                       .field_count = COUNT(probe_fields),
                                       .size = sizeof(SceneProbe),
                                       .init = init_probe,
-                                      .check = check_probe,
+                                      .rules = probe_rules,
+                                      .rule_count = COUNT(probe_rules),
                                       .variant_key = "type"};
 
 /* ---- The file ---- */
