@@ -16,5 +16,7 @@ fi
 setup_compile "$build" --target skiff_app
 
 cd "$root"
+# A thread that waits sleeps: where other programs share the cores, spinning costs several times the run.
+export OMP_WAIT_POLICY="${OMP_WAIT_POLICY:-passive}"
 "$build/skiff" run assets/scenes/settling-tank.json -o out/demo --force
 echo "The report is $root/out/demo/report.html"
