@@ -178,7 +178,7 @@ static Errors evaluate_residual(Dfsph *dfsph, const DfsphProblem *problem, Solve
     if (dfsph->moving)
         body_velocities(dfsph, problem, velocities);
     const float dt = problem->params->time_step;
-    const float gamma = kind == SOLVE_DENSITY ? problem->params->softening : 0.0f;
+    const float gamma = problem->params->softening;
     const float *density = problem->rows->pairs.density;
     float *residual = dfsph->residual;
     EACH_BLOCK {
@@ -187,7 +187,10 @@ static Errors evaluate_residual(Dfsph *dfsph, const DfsphProblem *problem, Solve
         EACH_SLICE {
             EACH_LANE {
                 const uint32_t i = first + l;
-                const float r = gamma * (density[i] - 1.0f) + dt * residual[i];
+                const float excess = density[i] - 1.0f;
+                /* where there is room to the rest density, approaching is no fault: thin water falls together freely */
+                const float term = kind == SOLVE_DENSITY ? gamma * excess : excess < 0.0f ? excess : 0.0f;
+                const float r = term + dt * residual[i];
                 residual[i] = dfsph->inv_diagonal[i] > 0.0f ? r : 0.0f;
             }
             error_lanes(residual + first, p + first, &one, &two);

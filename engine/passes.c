@@ -395,8 +395,8 @@ static void divergence(const PairData *pairs, const Float4 *v, float *result, ui
 
 /* ---- Gravity and viscosity ---- */
 
-/* v_i + dt g - nu sum_j (V / rho_j) (v_i - v_j) W_ij [Schechter & Bridson 2012]; walls and bodies do not take part here. The pairs' weights are
- * made again from the positions: storing them would make every iteration's stream a quarter wider. */
+/* XSPH [Schechter & Bridson 2012] without its division by the density: that makes the weights symmetric, and what i gives j gets. The
+ * weights are made again from the positions: storing them would make every iteration's stream a quarter wider. */
 static void forces(const ForceJob *job, uint32_t block) {
     const PairData *pairs = job->pairs;
     const Vf share = vf_set(-job->viscosity * pairs->volume);
@@ -408,15 +408,14 @@ static void forces(const ForceJob *job, uint32_t block) {
         vf_load4(job->velocity + first, &vx, &vy, &vz, &w);
         const uint32_t length = job->viscosity > 0.0f ? pairs->slice_length[slice] : 0;
         for (uint32_t entry = begin; entry < begin + length; entry++) {
-            Vi index = entry_index(pairs->entries, entry, pairs->wide);
+            const Vi index = entry_index(pairs->entries, entry, pairs->wide);
             vf_gather4(pairs->position + first, index, &x, &y, &z, &w);
             const Vf dx = vf_sub(px, x), dy = vf_sub(py, y), dz = vf_sub(pz, z);
             const Vf distance_sq = vf_fma(dx, dx, vf_fma(dy, dy, vf_mul(dz, dz)));
             Vf factor, weight;
             pair_kernel(&pairs->kernel, distance_sq, &factor, &weight);
             vf_gather4(job->velocity + first, index, &x, &y, &z, &w);
-            weight = vf_div(weight, vf_gather(pairs->density + first, index));
-            /* unused places are the particle itself: their velocity difference is zero */
+            /* unused places are the particle itself: their difference is zero */
             sx = vf_fma(weight, vf_sub(vx, x), sx);
             sy = vf_fma(weight, vf_sub(vy, y), sy);
             sz = vf_fma(weight, vf_sub(vz, z), sz);

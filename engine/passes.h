@@ -140,7 +140,7 @@ typedef struct BoundaryJob {
 typedef struct ForceJob {
     const PairData *pairs;
     const Float4 *velocity; /* in */
-    Float4 *result;         /* out: velocity after gravity and viscosity */
+    Float4 *result;         /* out: velocity + gravity_dt - viscosity sum_j V W_ij (v_i - v_j) */
     float gravity_dt[3];
     float viscosity;
 } ForceJob;
@@ -155,7 +155,7 @@ typedef struct Passes {
     void (*accelerate)(const PairData *pairs, const float *p, Float4 *result, uint32_t block);
     /* result_i = (D v)_i = v_i . G_i - sum_j v_j . V grad W_ij; contacts with moving bodies are the caller's */
     void (*divergence)(const PairData *pairs, const Float4 *v, float *result, uint32_t block);
-    /* gravity and XSPH viscosity */
+    /* gravity, and XSPH viscosity that conserves momentum exactly */
     void (*forces)(const ForceJob *job, uint32_t block);
 } Passes;
 

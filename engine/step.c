@@ -63,6 +63,7 @@ static void solve_divergence(SkiffSim *sim) {
     sim->stats.divergence_error_percent = 100.0 * result.error;
 }
 
+/* Gravity, and XSPH viscosity: neighbours exchange a share of their velocities. */
 static void apply_forces(SkiffSim *sim) {
     const float dt = sim->params.time_step;
     const float *g = sim->params.gravity;
@@ -72,13 +73,16 @@ static void apply_forces(SkiffSim *sim) {
                           .gravity_dt = {dt * g[0], dt * g[1], dt * g[2]},
                           .viscosity = sim->params.viscosity};
     const uint32_t blocks = particles_blocks(&sim->particles);
-#pragma omp parallel for schedule(static) num_threads(sim->threads)
-    for (uint32_t block = 0; block < blocks; block++)
-        sim->passes->forces(&job, block);
-#pragma omp parallel for schedule(static) num_threads(sim->threads)
-    for (uint32_t block = 0; block < blocks; block++)
-        memcpy(sim->particles.velocity + (size_t)block * BLOCK, sim->dfsph.guess + (size_t)block * BLOCK,
-               BLOCK * sizeof(Float4));
+#pragma omp parallel num_threads(sim->threads)
+    {
+#pragma omp for schedule(static)
+        for (uint32_t block = 0; block < blocks; block++)
+            sim->passes->forces(&job, block);
+#pragma omp for schedule(static)
+        for (uint32_t block = 0; block < blocks; block++)
+            memcpy(sim->particles.velocity + (size_t)block * BLOCK, sim->dfsph.guess + (size_t)block * BLOCK,
+                   BLOCK * sizeof(Float4));
+    }
     for (int b = 0; b < sim->body_count; b++)
         body_push(&sim->bodies[b], g, sim->time, (double)dt);
 }
