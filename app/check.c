@@ -6,14 +6,20 @@
 #include "scene.h"
 #include "summary.h"
 
+#include <math.h>
 #include <stdio.h>
+
+/* Rounding errors of exact integrals are not worth reading. */
+static double tidy(double value) {
+    return fabs(value) < 1e-9 ? 0.0 : value;
+}
 
 static void print_body(const SkiffBody *body) {
     fprintf(stderr, "    %s: mass %.6g kg, centre (%.5g, %.5g, %.5g) m, %u samples\n", body->name, body->mass,
-            body->position[0], body->position[1], body->position[2], body->sample_count);
+            tidy(body->position[0]), tidy(body->position[1]), tidy(body->position[2]), body->sample_count);
     for (int row = 0; row < 3; row++)
         fprintf(stderr, "      %s [%11.5g %11.5g %11.5g]%s\n", row == 0 ? "inertia" : "       ",
-                body->inertia[row][0], body->inertia[row][1], body->inertia[row][2],
+                tidy(body->inertia[row][0]), tidy(body->inertia[row][1]), tidy(body->inertia[row][2]),
                 row == 2 ? " kg m^2" : "");
 }
 

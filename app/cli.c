@@ -120,18 +120,17 @@ static const Command commands[] = {
      "  skiff run assets/scenes/dam-body.json -o out/dam --resume --duration 4\n",
      run_options, COUNT(run_options), run_command},
     {"check", "SCENE", "Check a scene and show what it means",
-     "Reports every problem of the file, with its place, the values allowed and the nearest name. A good "
-     "scene is printed to\n"
-     "stdout as JSON with every default filled in; counts, bodies and memory follow on stderr. Writes no "
-     "file.\n",
+     "Reports every problem of the file, with its place, the values allowed and the nearest name. A good\n"
+     "scene is printed to stdout as JSON with every default filled in; counts, bodies and memory follow on\n"
+     "stderr. Writes no file.\n",
      "  skiff check assets/scenes/floating-box.json\n"
      "  skiff check scene.json --set particleRadius=0.02 > effective.json\n"
      "  skiff check --schema > scene.schema.json\n",
      check_options, COUNT(check_options), check_command},
     {"bench", "SCENE", "Measure the time of a step",
-     "Lets the scene settle, then times windows of steps and prints the median over the windows: ms for each "
-     "phase, iterations,\n"
-     "particles a second, and the errors reached. Appends a row to the scene's CSV file of results.\n",
+     "Lets the scene settle, then times windows of steps and prints the median over the windows: ms for\n"
+     "each phase, iterations, particles a second, and the errors reached. Appends a row to the scene's CSV\n"
+     "file of results.\n",
      "  skiff bench assets/scenes/bench-tank.json\n"
      "  skiff bench assets/scenes/bench-dam.json --settle 0 --steps 95 --windows 7 --json\n",
      bench_options, COUNT(bench_options), bench_command},

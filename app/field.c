@@ -160,8 +160,8 @@ static void check_groups(const ObjectType *type, const json_t *value, FieldReade
     }
 }
 
-static void check_presence(const ObjectType *type, const json_t *value, const void *object,
-                           bool *failed, FieldReader *reader) {
+static void check_presence(const ObjectType *type, const json_t *value, const void *object, bool *failed,
+                           FieldReader *reader) {
     Field field;
     unsigned variant = variant_of(type, object);
     for (int i = 0; field_at(type, i, &field); i++)

@@ -128,6 +128,7 @@ static void write_figures(FILE *out, const json_t *summary) {
     figure_count(out, number_at(summary, "boundary_samples", NULL, NULL), "boundary samples");
     figure_number(out, number_at(summary, "time", NULL, NULL), "s simulated");
     figure_count(out, number_at(summary, "steps", NULL, NULL), "steps");
+    figure_number(out, number_at(summary, "ms", "step", "p50"), "ms a step, median");
     figure_number(out, number_at(summary, "ms", "step", "mean"), "ms a step, mean");
     figure_number(out, number_at(summary, "ms", "step", "p99"), "ms a step, 99th percentile");
     figure_number(out, number_at(summary, "real_time_factor", NULL, NULL),
@@ -138,6 +139,8 @@ static void write_figures(FILE *out, const json_t *summary) {
     figure_number(out, number_at(summary, "errors_percent", "density_max", "max"),
                   "% density error, largest");
     figure_number(out, number_at(summary, "peak_rss_mb", NULL, NULL), "MB of memory, peak");
+    if (number_at(summary, "removed", NULL, NULL) > 0)
+        figure_count(out, number_at(summary, "removed", NULL, NULL), "particles that left the domain");
     fputs("</div>\n", out);
 }
 
@@ -340,18 +343,17 @@ static void write_body_table(FILE *out, const SkiffSim *sim) {
         return;
     fputs("<h2>Bodies at the end</h2>\n<div class=\"wide\"><table><tr><th>name</th><th>mass, kg</th><th>x, "
           "m</th><th>y, m</th>"
-          "<th>z, m</th><th>tilt, &deg;</th><th>speed, m/s</th><th>samples</th></tr>\n",
+          "<th>z, m</th><th>turned, &deg;</th><th>speed, m/s</th><th>samples</th></tr>\n",
           out);
     for (int i = 0; i < count; i++) {
         SkiffBody body = skiff_body(sim, i);
         const double *v = body.velocity, *q = body.rotation;
-        double up = 1 - 2 * (q[0] * q[0] + q[2] * q[2]); /* y of the body's own y axis */
-        double tilt = acos(fmin(fmax(up, -1), 1)) * 180 / 3.14159265358979323846;
+        double turned = 2 * acos(fmin(fabs(q[3]), 1)) * 180 / 3.14159265358979323846; /* since the start */
         fputs("<tr><td>", out);
         svg_text(out, body.name);
         fprintf(out,
                 "</td><td>%.5g</td><td>%.4f</td><td>%.4f</td><td>%.4f</td><td>%.1f</td><td>%.4f</td><td>",
-                body.mass, body.position[0], body.position[1], body.position[2], tilt,
+                body.mass, body.position[0], body.position[1], body.position[2], turned,
                 sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]));
         write_count(out, body.sample_count);
         fputs("</td></tr>\n", out);

@@ -218,6 +218,18 @@ static bool read_tables(const Run *run, ReportInput *input, Err *err) {
             csv_read(path_in(run, "probes.csv", path), &input->probes, err));
 }
 
+static void print_end(const Run *run, const RunEnd *end, const json_t *summary, const char *report) {
+    const json_t *step_ms = json_object_get(json_object_get(summary, "ms"), "step");
+    long long removed = json_integer_value(json_object_get(summary, "removed"));
+    fprintf(stderr, "%s at t = %.6g s, step %llu: %.4g ms/step, real-time factor %.3g\n", end->status,
+            skiff_time(run->sim), (unsigned long long)skiff_step_count(run->sim),
+            json_number_value(json_object_get(step_ms, "mean")),
+            json_number_value(json_object_get(summary, "real_time_factor")));
+    if (removed > 0)
+        fprintf(stderr, "%lld particles left the domain and were removed\n", removed);
+    fprintf(stderr, "%s\n", report);
+}
+
 static bool write_results(Run *run, const RunEnd *end, Err *err) {
     char path[PATH_SIZE];
     ReportInput input = {.scene = run->scene, .sim = run->sim};
@@ -227,11 +239,7 @@ static bool write_results(Run *run, const RunEnd *end, Err *err) {
     ok = ok && json_text_write(path_in(run, "summary.json", path), summary, err) &&
          report_write(path_in(run, "report.html", path), &input, err);
     if (ok && !run->args->quiet)
-        fprintf(stderr, "%s at t = %.6g s, step %llu: %.4g ms/step, real-time factor %.3g\n%s\n", end->status,
-                skiff_time(run->sim), (unsigned long long)skiff_step_count(run->sim),
-                json_number_value(
-                    json_object_get(json_object_get(json_object_get(summary, "ms"), "step"), "mean")),
-                json_number_value(json_object_get(summary, "real_time_factor")), path);
+        print_end(run, end, summary, path);
     json_decref(summary);
     csv_free(&input.steps);
     csv_free(&input.hull);

@@ -105,6 +105,8 @@ json_t *summary_make(const Scene *scene, const SkiffSim *sim, const CsvTable *st
     json_object_set_new(summary, "time", json_text_double(skiff_time(sim)));
     json_object_set_new(summary, "time_step", json_text_float(skiff_params(sim)->time_step));
     json_object_set_new(summary, "particles", json_integer(skiff_particles(sim).count));
+    json_object_set_new(summary, "emitted", json_integer((json_int_t)column_sum(steps, "emitted")));
+    json_object_set_new(summary, "removed", json_integer((json_int_t)column_sum(steps, "removed")));
     json_object_set_new(summary, "boundary_samples", json_integer(summary_sample_count(sim)));
     json_object_set_new(summary, "contacts", json_integer(stats->contacts));
     json_object_set_new(summary, "bodies", json_integer(skiff_body_count(sim)));

@@ -12,7 +12,8 @@ enum {
     TOP = 12,
     BOTTOM = 46,
     BUCKETS = 240,
-    MAX_TICKS = 64
+    MAX_TICKS = 64,
+    MAX_DECADES = 5
 };
 
 static const char *const colours[SVG_MAX_SERIES] = {"#2f6db3", "#e8762b", "#3a9a5b", "#c8413b",
@@ -122,8 +123,8 @@ static void linear_ticks(Axis *axis, int wanted) {
 
 static void logarithmic_ticks(Axis *axis) {
     int low = (int)floor(log10(axis->min) + 1e-9), high = (int)ceil(log10(axis->max) - 1e-9);
-    if (high - low > 8)
-        low = high - 8;
+    if (high - low > MAX_DECADES)
+        low = high - MAX_DECADES; /* a first step of nearly 0 must not flatten the rest */
     if (high == low)
         high++;
     axis->min = pow(10, low);
@@ -176,7 +177,9 @@ static double to_y(const Plot *plot, double value) {
 
 static void print_tick(FILE *out, const Axis *axis, double value) {
     double shown = fabs(value) < 1e-12 ? 0.0 : value / axis->label_scale;
-    if (axis->decimals < 0)
+    if (axis->is_logarithmic && value < 0.99e-3)
+        fprintf(out, "1e%.0f", log10(value));
+    else if (axis->decimals < 0)
         fprintf(out, "%.3g", shown);
     else
         fprintf(out, "%.*f", axis->decimals, shown);

@@ -1,0 +1,611 @@
+/* The program as a user meets it: exit codes, messages, files. Drives the real binary. */
+#include "app/csv.h"
+#include "engine/base/err.h"
+#include "engine/base/file.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <jansson.h>
+#include <math.h>
+#include <setjmp.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+#define COUNT(table) ((int)(sizeof(table) / sizeof *(table)))
+#define SMALL        SKIFF_SOURCE_DIR "/assets/scenes/small.json"
+
+enum { MAX_ARGUMENTS = 24, PATH_SIZE = 512 };
+
+static char folder[] = "/tmp/skiff-test-cli-XXXXXX";
+
+static int make_folder(void **state) {
+    (void)state;
+    return mkdtemp(folder) && chdir(folder) == 0 ? 0 : -1;
+}
+
+static int remove_folder(void **state) {
+    (void)state;
+    char command[128];
+    snprintf(command, sizeof command, "rm -rf '%s'", folder);
+    return chdir("/") == 0 ? system(command) : -1;
+}
+
+/* ---- Running the program ---- */
+
+typedef struct Result {
+    int code; /* exit code, or -signal */
+    char *out, *err;
+} Result;
+
+static char *read_text(const char *path) {
+    char *text;
+    size_t size;
+    Err err = {0};
+    if (!file_read(path, 1 << 26, &text, &size, &err))
+        fail_msg("%s", err.message);
+    return text;
+}
+
+static void write_text(const char *path, const char *text) {
+    Err err = {0};
+    if (!file_write(path, text, strlen(text), &err))
+        fail_msg("%s", err.message);
+}
+
+/* Arguments separated by blanks; none holds one. */
+static pid_t start(const char *arguments) {
+    char *words = strdup(arguments), *argv[MAX_ARGUMENTS] = {(char *)(uintptr_t)SKIFF_PROGRAM};
+    assert_non_null(words);
+    int count = 1;
+    for (char *word = strtok(words, " "); word && count + 1 < MAX_ARGUMENTS; word = strtok(NULL, " "))
+        argv[count++] = word;
+    pid_t child = fork();
+    assert_true(child >= 0);
+    if (child == 0) {
+        int out = open("stdout.txt", O_WRONLY | O_CREAT | O_TRUNC, 0644);
+        int err = open("stderr.txt", O_WRONLY | O_CREAT | O_TRUNC, 0644);
+        if (out < 0 || err < 0 || dup2(out, 1) < 0 || dup2(err, 2) < 0)
+            _exit(99);
+        execv(SKIFF_PROGRAM, argv);
+        _exit(98);
+    }
+    free(words);
+    return child;
+}
+
+static Result finish(pid_t child) {
+    int status;
+    while (waitpid(child, &status, 0) < 0)
+        assert_int_equal(errno, EINTR);
+    return (Result){.code = WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status),
+                    .out = read_text("stdout.txt"),
+                    .err = read_text("stderr.txt")};
+}
+
+static void drop(Result *result) {
+    free(result->out);
+    free(result->err);
+}
+
+/* Runs and checks exit code and what stdout and stderr contain (NULL: nothing at all, "": whatever). */
+static void expect(const char *arguments, int code, const char *out, const char *err) {
+    Result result = finish(start(arguments));
+    if (result.code != code)
+        fail_msg("skiff %s: exit code %d, expected %d\n%s", arguments, result.code, code, result.err);
+    if (out ? !strstr(result.out, out) : *result.out)
+        fail_msg("skiff %s: stdout is\n%s\nexpected\n%s", arguments, result.out, out ? out : "nothing");
+    if (err ? !strstr(result.err, err) : *result.err)
+        fail_msg("skiff %s: stderr is\n%s\nexpected\n%s", arguments, result.err, err ? err : "nothing");
+    drop(&result);
+}
+
+static bool exists(const char *path) {
+    return access(path, F_OK) == 0;
+}
+
+static int entry_count(const char *path) {
+    DIR *directory = opendir(path);
+    int count = 0;
+    assert_non_null(directory);
+    while (readdir(directory))
+        count++;
+    closedir(directory);
+    return count - 2;
+}
+
+/* ---- The command line ---- */
+
+static void usage_mistakes_exit_with_2(void **state) {
+    (void)state;
+    static const struct {
+        const char *arguments, *message;
+    } rows[] = {
+        {"", "skiff: a command is missing\nTry 'skiff --help'.\n"},
+        {"rnu", "skiff: unknown command rnu, did you mean run?\nTry 'skiff --help'.\n"},
+        {"elephant", "skiff: unknown command elephant\nTry 'skiff --help'.\n"},
+        {"help rnu", "skiff: unknown command rnu, did you mean run?\n"},
+        {"run", "skiff run: the scene is missing\nTry 'skiff run --help'.\n"},
+        {"run a.json", "skiff run: -o DIR is missing: the folder for the results\n"},
+        {"run a.json b.json", "skiff run: one scene at a time: \"a.json\" and \"b.json\" are given\n"},
+        {"run a.json --frce", "skiff run: unknown option --frce, did you mean --force?\n"},
+        {"run a.json --check 3", "skiff run: unknown option --check, did you mean --checkpoint-every?\n"},
+        {"run a.json -z", "skiff run: unknown option -z\n"},
+        {"run a.json --force=yes", "skiff run: --force takes no value\n"},
+        {"run a.json -o", "skiff run: --output: DIR is missing\n"},
+        {"run a.json -o out --threads 0",
+         "skiff run: --threads: expected an integer from 1 to 1024, found \"0\"\n"},
+        {"run a.json -o out --threads 2.5",
+         "skiff run: --threads: expected an integer from 1 to 1024, found \"2.5\"\n"},
+        {"run a.json -o out --threads many",
+         "skiff run: --threads: expected an integer from 1 to 1024, found \"many\"\n"},
+        {"run a.json -o out --duration nan",
+         "skiff run: --duration: expected a number from 1e-06 to 1e+06, found \"nan\"\n"},
+        {"run a.json -o out --duration -1",
+         "skiff run: --duration: expected a number from 1e-06 to 1e+06, found \"-1\"\n"},
+        {"run a.json -o out --simd axv2",
+         "skiff run: --simd: expected auto|plain|avx2|avx512, found \"axv2\", did you mean avx2?\n"},
+        {"run a.json -o out --force --resume",
+         "skiff run: --force starts anew and --resume goes on: give one of them\n"},
+        {"run a.json -o out --resume", "skiff run: out: there is no such folder to resume\n"},
+        {"bench a.json --steps 0",
+         "skiff bench: --steps: expected an integer from 1 to 1e+06, found \"0\"\n"},
+        {"check " SMALL " --set viscosty=1",
+         "skiff check: --set viscosty=1: no key \"viscosty\", did you mean viscosity?\n"},
+    };
+    for (int i = 0; i < COUNT(rows); i++)
+        expect(rows[i].arguments, ERR_USAGE, NULL, rows[i].message);
+}
+
+static void help_explains_every_command(void **state) {
+    (void)state;
+    static const char *const commands[] = {"run", "check", "bench"};
+    expect("--help", 0, "Usage:", NULL);
+    expect("-h", 0, "Exit codes: 0 ok, 2 usage, 3 bad input, 5 diverged", NULL);
+    expect("help", 0, "skiff bench SCENE", NULL);
+    expect("--version", 0, "commit ", NULL);
+    for (int i = 0; i < COUNT(commands); i++) {
+        char arguments[64], usage[64];
+        snprintf(usage, sizeof usage, "Usage: skiff %s SCENE", commands[i]);
+        snprintf(arguments, sizeof arguments, "%s --help", commands[i]);
+        expect(arguments, 0, usage, NULL);
+        expect(arguments, 0, "--set PATH=VALUE", NULL);
+        snprintf(arguments, sizeof arguments, "help %s", commands[i]);
+        expect(arguments, 0, usage, NULL);
+        expect(arguments, 0, "\nExamples:\n  skiff ", NULL);
+    }
+}
+
+static void help_lines_are_short(void **state) {
+    (void)state;
+    static const char *const arguments[] = {"--help", "run --help", "check --help", "bench --help"};
+    for (int i = 0; i < COUNT(arguments); i++) {
+        Result result = finish(start(arguments[i]));
+        for (const char *line = result.out; *line;) {
+            size_t count = strcspn(line, "\n");
+            assert_in_range(count, 0, 110);
+            line += count + (line[count] == '\n');
+        }
+        drop(&result);
+    }
+}
+
+/* ---- Scenes ---- */
+
+static void bad_scenes_exit_with_3(void **state) {
+    (void)state;
+    expect("check nowhere.json", ERR_INPUT, NULL, "nowhere.json: ");
+    expect("check /tmp", ERR_INPUT, NULL, "/tmp: is a directory");
+    write_text("cut.json", "{\"version\": 1,\n \"Tank\": {");
+    expect("check cut.json", ERR_INPUT, NULL, "cut.json:2:");
+    expect("run cut.json -o cut", ERR_INPUT, NULL, "not valid JSON");
+    expect("bench cut.json", ERR_INPUT, NULL, "cut.json:2:");
+    expect("check " SMALL " --set viscosity=5", ERR_INPUT, NULL,
+           "--set Configuration.viscosity: expected a number from 0 to 1, found 5\n");
+    assert_false(exists("cut")); /* nothing is written for a bad scene */
+}
+
+/* What only the engine can tell comes with file and path too. */
+static void the_engine_reports_with_file_and_path(void **state) {
+    (void)state;
+    static const char *const heads[] = {
+        "{\"version\": 1, \"FluidBlocks\": [{\"start\": [0, 0, 0], \"end\": [1, 1, 1]}],"};
+    char text[1024];
+    snprintf(
+        text, sizeof text,
+        "%s \"RigidBodies\": [{\"name\": \"a\", \"geometryFile\": \"missing.obj\", \"isDynamic\": true}]}",
+        heads[0]);
+    write_text("mesh.json", text);
+    expect("check mesh.json", ERR_INPUT, NULL, "mesh.json: RigidBodies[0]");
+    expect("run mesh.json -o mesh", ERR_INPUT, NULL, "missing.obj");
+    assert_false(exists("mesh"));
+    snprintf(text, sizeof text,
+             "%s \"RigidBodies\": [{\"name\": \"a\", \"sphere\": 0.2}, {\"name\": \"a\", \"sphere\": 0.2,"
+             " \"translation\": [3, 0, 0]}]}",
+             heads[0]);
+    write_text("twins.json", text);
+    expect("check twins.json", ERR_INPUT, NULL, "twins.json: RigidBodies[1]");
+}
+
+static void check_prints_a_scene_and_writes_nothing(void **state) {
+    (void)state;
+    assert_int_equal(mkdir("empty", 0755), 0);
+    Result first = finish(start("check " SMALL));
+    assert_int_equal(first.code, 0);
+    assert_non_null(strstr(first.err, "particles         800\n"));
+    assert_non_null(strstr(first.err, "crate: mass 4 kg, centre (0, 0.56, 0) m"));
+    assert_non_null(strstr(first.out, "\"viscosity\": 0.02"));
+    write_text("effective.json", first.out);
+    Result second = finish(start("check effective.json"));
+    assert_int_equal(second.code, 0);
+    assert_string_equal(first.out, second.out);
+    drop(&first);
+    drop(&second);
+    assert_int_equal(chdir("empty"), 0);
+    Result third = finish(start("check " SMALL));
+    assert_int_equal(third.code, 0);
+    drop(&third);
+    assert_int_equal(entry_count("."), 2); /* stdout.txt and stderr.txt */
+    assert_int_equal(chdir(".."), 0);
+}
+
+static void the_schema_is_printed(void **state) {
+    (void)state;
+    Result result = finish(start("check --schema"));
+    char *shipped = read_text(SKIFF_SOURCE_DIR "/assets/schema/scene.schema.json");
+    assert_int_equal(result.code, 0);
+    assert_string_equal(result.out, shipped);
+    free(shipped);
+    drop(&result);
+}
+
+/* ---- Runs ---- */
+
+static void assert_same_file(const char *a, const char *b) {
+    char *x = read_text(a), *y = read_text(b);
+    if (strcmp(x, y) != 0)
+        fail_msg("%s and %s differ", a, b);
+    free(x);
+    free(y);
+}
+
+/* Equal in all columns but the measured times. */
+static void assert_same_steps(const char *a, const char *b) {
+    CsvTable x, y;
+    Err err = {0};
+    if (!csv_read(a, &x, &err) || !csv_read(b, &y, &err))
+        fail_msg("%s", err.message);
+    assert_int_equal(x.column_count, y.column_count);
+    assert_int_equal(x.row_count, y.row_count);
+    assert_true(x.row_count > 0);
+    for (int c = 0; c < x.column_count; c++) {
+        assert_string_equal(x.names[c], y.names[c]);
+        const char *ending = strrchr(x.names[c], '_');
+        if (ending && strcmp(ending, "_ms") == 0)
+            continue;
+        for (size_t r = 0; r < x.row_count; r++) {
+            size_t i = r * (size_t)x.column_count + (size_t)c;
+            if (x.values[i] != y.values[i])
+                fail_msg("%s and %s differ in row %zu, column %s", a, b, r + 1, x.names[c]);
+        }
+    }
+    csv_free(&x);
+    csv_free(&y);
+}
+
+static const char *in(const char *run, const char *name) {
+    static char paths[4][PATH_SIZE];
+    static int next;
+    char *path = paths[next++ % 4];
+    snprintf(path, PATH_SIZE, "%s/%s", run, name);
+    return path;
+}
+
+static json_t *summary_of(const char *run) {
+    json_t *summary = json_load_file(in(run, "summary.json"), 0, NULL);
+    assert_non_null(summary);
+    return summary;
+}
+
+static void assert_same_end(const char *a, const char *b) {
+    json_t *x = summary_of(a), *y = summary_of(b);
+    assert_string_equal(json_string_value(json_object_get(x, "state_hash")),
+                        json_string_value(json_object_get(y, "state_hash")));
+    assert_int_equal(json_integer_value(json_object_get(x, "steps")),
+                     json_integer_value(json_object_get(y, "steps")));
+    json_decref(x);
+    json_decref(y);
+    assert_same_steps(in(a, "steps.csv"), in(b, "steps.csv"));
+    assert_same_file(in(a, "hull.csv"), in(b, "hull.csv"));
+    assert_same_file(in(a, "probes.csv"), in(b, "probes.csv"));
+}
+
+static void a_run_writes_its_results(void **state) {
+    (void)state;
+    static const char *const names[] = {"steps.csv",  "hull.csv",    "probes.csv", "summary.json",
+                                        "scene.json", "report.html", "state.skiff"};
+    expect("run " SMALL " -o done --duration 0.06", 0, NULL, "finished at t = 0.06 s, step 20");
+    for (int i = 0; i < COUNT(names); i++)
+        assert_true(exists(in("done", names[i])));
+    assert_int_equal(entry_count("done"), COUNT(names)); /* no temporary files */
+    json_t *summary = summary_of("done");
+    assert_string_equal(json_string_value(json_object_get(summary, "status")), "finished");
+    assert_int_equal(json_integer_value(json_object_get(summary, "particles")), 800);
+    assert_non_null(json_object_get(json_object_get(json_object_get(summary, "ms"), "step"), "p99"));
+    assert_non_null(json_object_get(json_object_get(summary, "machine"), "cpu"));
+    json_decref(summary);
+    char *report = read_text(in("done", "report.html"));
+    assert_non_null(strstr(report, "A small tank for tests"));
+    assert_non_null(strstr(report, "</html>"));
+    assert_null(strstr(report, "http")); /* nothing from elsewhere */
+    assert_null(strstr(report, "nan"));
+    free(report);
+    CsvTable steps;
+    Err err = {0};
+    assert_true(csv_read(in("done", "steps.csv"), &steps, &err));
+    assert_int_equal(steps.row_count, 20);
+    assert_int_equal(csv_column(&steps, "step"), 0);
+    assert_true(csv_column(&steps, "step_ms") == steps.column_count - 1);
+    csv_free(&steps);
+}
+
+static void an_existing_folder_is_refused(void **state) {
+    (void)state;
+    assert_int_equal(mkdir("kept", 0755), 0);
+    write_text("kept/state.skiff", "old");
+    write_text("kept/other.txt", "mine");
+    expect("run " SMALL " -o kept --duration 0.01", ERR_USAGE, NULL,
+           "kept: the folder exists; --resume goes on");
+    assert_int_equal(entry_count("kept"), 2);
+    expect("run " SMALL " -o kept --resume", ERR_INPUT, NULL, "kept/");
+    expect("run " SMALL " -o kept --force --duration 0.01 --quiet", 0, NULL, NULL);
+    assert_true(exists("kept/report.html") && exists("kept/other.txt"));
+    write_text("file", "");
+    expect("run " SMALL " -o file --force", ERR_USAGE, NULL, "file: exists and is not a folder");
+    expect("run " SMALL " -o file/below --duration 0.01", ERR_IO, NULL, "file");
+}
+
+static void probes_have_their_own_rate(void **state) {
+    (void)state;
+    CsvTable probes;
+    Err err = {0};
+    expect("run " SMALL " -o rate -q --duration 0.12 --set probeRate=100", 0, NULL, NULL);
+    assert_true(csv_read("rate/probes.csv", &probes, &err));
+    assert_int_equal(probes.row_count, 12);
+    assert_string_equal(probes.names[0], "t");
+    assert_string_equal(probes.names[1], "gauge");
+    assert_string_equal(probes.names[probes.column_count - 1], "floor.tz");
+    for (size_t r = 0; r < probes.row_count; r++) { /* the first step at or after each 10 ms */
+        double late = probes.values[r * (size_t)probes.column_count] - 0.01 * (double)(r + 1);
+        assert_true(late > -1e-6 && late < 0.003);
+    }
+    csv_free(&probes);
+}
+
+static void copy(const char *from, const char *to) {
+    char *bytes;
+    size_t size;
+    Err err = {0};
+    assert_true(file_read(from, 1 << 30, &bytes, &size, &err));
+    assert_true(file_write(to, bytes, size, &err));
+    free(bytes);
+}
+
+static void a_resumed_run_equals_a_whole_one(void **state) {
+    (void)state;
+    expect("run " SMALL " -o whole -q --duration 0.15 --threads 1", 0, NULL, NULL);
+    expect("run " SMALL " -o parts -q --duration 0.06", 0, NULL, NULL);
+    copy("parts/state.skiff", "early.skiff");
+    expect("run " SMALL " -o parts -q --resume --duration 0.15", 0, NULL, NULL);
+    assert_same_end("whole", "parts");
+    /* killed after an old checkpoint: rows beyond it are cut off, a half-written one too */
+    copy("early.skiff", "parts/state.skiff");
+    FILE *steps = fopen("parts/steps.csv", "ab");
+    assert_non_null(steps);
+    fputs("51,0.15", steps);
+    fclose(steps);
+    expect("run " SMALL " -o parts -q --resume --duration 0.15", 0, NULL, NULL);
+    assert_same_end("whole", "parts");
+    /* resuming what is finished changes nothing */
+    expect("run " SMALL " -o parts -q --resume --duration 0.15", 0, NULL, NULL);
+    assert_same_end("whole", "parts");
+}
+
+static void a_resume_that_cannot_be_right_is_refused(void **state) {
+    (void)state;
+    expect("run " SMALL " -o odd -q --duration 0.03", 0, NULL, NULL);
+    expect("run " SMALL " -o odd -q --resume --set viscosity=0.1", ERR_INPUT, NULL,
+           "differs from odd/scene.json at Configuration.viscosity");
+    expect("run " SMALL " -o odd -q --resume --set RigidBodies[0].density=1", ERR_INPUT, NULL,
+           "at RigidBodies[0].density");
+    copy("odd/steps.csv", "steps.csv");
+    write_text("odd/steps.csv", "step,t\n1,0.003\n");
+    expect("run " SMALL " -o odd -q --resume", ERR_INPUT, NULL, "odd/steps.csv: has other columns");
+    char *text = read_text("steps.csv");
+    strchr(strchr(strchr(text, '\n') + 1, '\n') + 1, '\n')[1] = '\0'; /* header and two steps */
+    write_text("odd/steps.csv", text);
+    free(text);
+    expect("run " SMALL " -o odd -q --resume", ERR_INPUT, NULL,
+           "odd/steps.csv: ends at step 2, before the checkpoint at step 10");
+    copy("steps.csv", "odd/steps.csv");
+    write_text("odd/state.skiff", "not a state");
+    expect("run " SMALL " -o odd -q --resume", ERR_INPUT, NULL, "odd/state.skiff");
+    unlink("odd/state.skiff");
+    expect("run " SMALL " -o odd -q --resume", ERR_INPUT, NULL,
+           "odd/state.skiff: there is no checkpoint to resume from");
+}
+
+static void wait_for_file(const char *path, pid_t child) {
+    int status;
+    while (!exists(path)) {
+        assert_int_equal(waitpid(child, &status, WNOHANG), 0); /* it must not end by itself */
+        nanosleep(&(struct timespec){.tv_nsec = 1000000}, NULL);
+    }
+}
+
+static void signals_end_a_run_with_a_checkpoint(void **state) {
+    (void)state;
+    static const int numbers[] = {SIGINT, SIGTERM};
+    static const char *const runs[] = {"sigint", "sigterm"};
+    for (int i = 0; i < COUNT(numbers); i++) {
+        char arguments[PATH_SIZE];
+        unlink(in(runs[i], "state.skiff"));
+        snprintf(arguments, sizeof arguments, "run " SMALL " -o %s --duration 100 --checkpoint-every 0",
+                 runs[i]);
+        pid_t child = start(arguments);
+        wait_for_file(in(runs[i], "state.skiff"), child);
+        assert_int_equal(kill(child, numbers[i]), 0);
+        Result result = finish(child);
+        assert_int_equal(result.code, ERR_INTERRUPTED);
+        assert_non_null(strstr(result.err, "skiff run: interrupted; add --resume to go on from here\n"));
+        drop(&result);
+        json_t *summary = summary_of(runs[i]);
+        assert_string_equal(json_string_value(json_object_get(summary, "status")), "interrupted");
+        double time = json_number_value(json_object_get(summary, "time")) + 0.03;
+        json_decref(summary);
+        snprintf(arguments, sizeof arguments, "run " SMALL " -o %s -q --resume --duration %.9g", runs[i],
+                 time);
+        expect(arguments, 0, NULL, NULL);
+        snprintf(arguments, sizeof arguments, "run " SMALL " -o whole-%s -q --duration %.9g", runs[i], time);
+        expect(arguments, 0, NULL, NULL);
+        snprintf(arguments, sizeof arguments, "whole-%s", runs[i]);
+        assert_same_end(runs[i], arguments);
+    }
+}
+
+static void a_blow_up_exits_with_5(void **state) {
+    (void)state;
+    expect("run " SMALL " -o wild -q --set speedLimit=0.5", ERR_DIVERGED, NULL,
+           "the state is in wild/diverged.skiff");
+    assert_true(exists("wild/diverged.skiff") && exists("wild/report.html"));
+    json_t *summary = summary_of("wild");
+    assert_string_equal(json_string_value(json_object_get(summary, "status")), "diverged");
+    assert_true(strlen(json_string_value(json_object_get(summary, "message"))) > 0);
+    json_decref(summary);
+}
+
+/* ---- Benchmarks ---- */
+
+static void bench_prints_one_line_of_json(void **state) {
+    (void)state;
+    static const char *const keys[] = {"scene",
+                                       "particles",
+                                       "boundary_samples",
+                                       "threads",
+                                       "isa",
+                                       "ms_per_step",
+                                       "ms_min",
+                                       "ms_max",
+                                       "search_ms",
+                                       "iteration_ms",
+                                       "density_iterations",
+                                       "divergence_iterations",
+                                       "density_error_percent",
+                                       "density_max_percent",
+                                       "neighbours",
+                                       "peak_rss_mb",
+                                       "particles_per_s",
+                                       "real_time_factor",
+                                       "state_hash"};
+    Result result =
+        finish(start("bench " SMALL " --settle 0.03 --steps 3 --windows 3 --json --quiet --no-results"));
+    assert_int_equal(result.code, 0);
+    assert_ptr_equal(strchr(result.out, '\n'), result.out + strlen(result.out) - 1);
+    json_t *line = json_loads(result.out, 0, NULL);
+    assert_non_null(line);
+    for (int i = 0; i < COUNT(keys); i++)
+        if (!json_object_get(line, keys[i]))
+            fail_msg("bench --json has no %s", keys[i]);
+    assert_int_equal(json_integer_value(json_object_get(line, "particles")), 800);
+    double least = json_number_value(json_object_get(line, "ms_min"));
+    double middle = json_number_value(json_object_get(line, "ms_per_step"));
+    double most = json_number_value(json_object_get(line, "ms_max"));
+    assert_true(0 < least && least <= middle && middle <= most);
+    json_decref(line);
+    drop(&result);
+}
+
+static void bench_keeps_rows(void **state) {
+    (void)state;
+    static const char arguments[] = "bench " SMALL " --settle 0 --steps 1 --windows 2 -q --results rows";
+    expect(arguments, 0, "density solve", NULL);
+    expect(arguments, 0, "real-time factor", NULL);
+    char *text = read_text("rows/small.csv");
+    int lines = 0;
+    for (const char *c = text; *c; c++)
+        lines += *c == '\n';
+    assert_int_equal(lines, 3); /* a header and two rows */
+    assert_ptr_equal(strstr(text, "date,commit,cpu,compiler,isa,threads,scene,"), text);
+    free(text);
+    write_text("rows/small.csv", "other,columns\n");
+    expect(arguments, ERR_INPUT, "density solve", "rows/small.csv: has other columns");
+}
+
+/* ---- Writing that fails ---- */
+
+static void a_full_disk_is_noticed(void **state) {
+    (void)state;
+    CsvWriter writer;
+    Err err = {0};
+    assert_false(csv_create(&writer, "/dev/full", "a,b", &err));
+    assert_int_equal(err.code, ERR_IO);
+    assert_non_null(strstr(err.message, "/dev/full: writing failed: "));
+    csv_close(&writer, NULL);
+    assert_int_equal(system(SKIFF_PROGRAM " --help > /dev/full 2> full.txt") >> 8, ERR_IO);
+    char *text = read_text("full.txt");
+    assert_non_null(strstr(text, "writing to stdout failed"));
+    free(text);
+}
+
+static void damaged_tables_are_refused(void **state) {
+    (void)state;
+    static const struct {
+        const char *text, *message;
+    } rows[] = {
+        {"", "t.csv:1: the header is missing or cut off"},
+        {"a,b", "t.csv:1: the header is missing or cut off"},
+        {"a,b\n1,2\n1,x\n", "t.csv:3: column 2 is not a number"},
+        {"a,b\n1\n", "t.csv:2: expected 2 numbers"},
+        {"a,b\n1,2,3\n", "t.csv:2: expected 2 numbers"},
+    };
+    for (int i = 0; i < COUNT(rows); i++) {
+        CsvTable table;
+        Err err = {0};
+        write_text("t.csv", rows[i].text);
+        assert_false(csv_read("t.csv", &table, &err));
+        assert_string_equal(err.message, rows[i].message);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(usage_mistakes_exit_with_2),
+        cmocka_unit_test(help_explains_every_command),
+        cmocka_unit_test(help_lines_are_short),
+        cmocka_unit_test(bad_scenes_exit_with_3),
+        cmocka_unit_test(the_engine_reports_with_file_and_path),
+        cmocka_unit_test(check_prints_a_scene_and_writes_nothing),
+        cmocka_unit_test(the_schema_is_printed),
+        cmocka_unit_test(a_run_writes_its_results),
+        cmocka_unit_test(an_existing_folder_is_refused),
+        cmocka_unit_test(probes_have_their_own_rate),
+        cmocka_unit_test(a_resumed_run_equals_a_whole_one),
+        cmocka_unit_test(a_resume_that_cannot_be_right_is_refused),
+        cmocka_unit_test(signals_end_a_run_with_a_checkpoint),
+        cmocka_unit_test(a_blow_up_exits_with_5),
+        cmocka_unit_test(bench_prints_one_line_of_json),
+        cmocka_unit_test(bench_keeps_rows),
+        cmocka_unit_test(a_full_disk_is_noticed),
+        cmocka_unit_test(damaged_tables_are_refused),
+    };
+    return cmocka_run_group_tests_name("cli", tests, make_folder, remove_folder);
+}
