@@ -1,7 +1,7 @@
 /* Blocks of fluid: points of a cubic lattice, at the start or emitted later.
  *
- * Points inside a body are left out, so that a body may start immersed; points outside the tank are an error, and so is water on water: both would
- * explode in the first step. */
+ * Points inside a body are left out, so that a body may start immersed; points outside the tank are an error,
+ * and so is water on water: both would explode in the first step. */
 #include "sim.h"
 #include "base/log.h"
 
@@ -33,7 +33,8 @@ static bool inside_body(const SkiffSim *sim, const float p[3], int *inside) {
         for (int k = 0; k < 3; k++)
             arm[k] = (double)p[k] + sim->origin[k] - body->position[k];
         for (int k = 0; k < 3; k++) /* R^T arm */
-            local[k] = body->matrix[0][k] * arm[0] + body->matrix[1][k] * arm[1] + body->matrix[2][k] * arm[2];
+            local[k] =
+                body->matrix[0][k] * arm[0] + body->matrix[1][k] * arm[1] + body->matrix[2][k] * arm[2];
         const float q[3] = {(float)local[0], (float)local[1], (float)local[2]};
         const float r = sim->params.particle_radius;
         bool near = true;
@@ -73,7 +74,8 @@ static bool emit_one(SkiffSim *sim, int index, uint32_t *emitted, Err *err) {
                            0.5 * (counts[k] - 1.0) * (double)spacing - sim->origin[k]);
     const uint32_t neighbour = occupied(sim, first, counts, spacing);
     if (neighbour != UINT32_MAX)
-        return err_add(err, ERR_INPUT, "FluidBlocks[%d]: its place is not free at t = %g s: particle %llu is there", index,
+        return err_add(err, ERR_INPUT,
+                       "FluidBlocks[%d]: its place is not free at t = %g s: particle %llu is there", index,
                        sim->time, (unsigned long long)sim->particles.id[neighbour]);
     uint32_t outside = 0, carved = 0;
     int body = 0;
@@ -95,13 +97,15 @@ static bool emit_one(SkiffSim *sim, int index, uint32_t *emitted, Err *err) {
             }
     if (outside > 0) {
         sim->particles.count = before;
-        return err_add(err, ERR_INPUT,
-                       "FluidBlocks[%d]: %u of its %.0f particles are outside the tank, the first at (%g, %g, %g) m",
-                       index, outside, total, (double)example[0] + sim->origin[0],
-                       (double)example[1] + sim->origin[1], (double)example[2] + sim->origin[2]);
+        return err_add(
+            err, ERR_INPUT,
+            "FluidBlocks[%d]: %u of its %.0f particles are outside the tank, the first at (%g, %g, %g) m",
+            index, outside, total, (double)example[0] + sim->origin[0], (double)example[1] + sim->origin[1],
+            (double)example[2] + sim->origin[2]);
     }
     if (carved > 0)
-        log_write(LOG_INFO, "FluidBlocks[%d]: %u of %.0f particles left out where bodies are (the last in '%s')", index,
+        log_write(LOG_INFO,
+                  "FluidBlocks[%d]: %u of %.0f particles left out where bodies are (the last in '%s')", index,
                   carved, total, sim->bodies[body].name);
     *emitted += sim->particles.count - before;
     return true;

@@ -1,5 +1,6 @@
-/* Rigid bodies: mass properties, free and prescribed axes, motion. Double precision throughout: there are few of them, and at small speeds a
- * float position would not move. cglm has single precision only, hence the handful of operations below. */
+/* Rigid bodies: mass properties, free and prescribed axes, motion. Double precision throughout: there are few
+ * of them, and at small speeds a float position would not move. cglm has single precision only, hence the
+ * handful of operations below. */
 #ifndef SKIFF_BODY_H
 #define SKIFF_BODY_H
 
@@ -8,37 +9,42 @@
 
 typedef struct Body {
     char *name;
-    Mesh mesh; /* body axes, about the centre of mass */
+    Mesh mesh;  /* body axes, about the centre of mass */
     bool fixed; /* never moves: its samples are sorted once, with the walls */
     uint32_t free_axes;
     double release_time;
-    double mass, volume;       /* kg, m^3 */
-    double inertia[3][3];      /* kg m^2, body axes */
-    double position[3];        /* centre of mass, world */
-    double rotation[4];        /* x y z w */
+    double mass, volume;  /* kg, m^3 */
+    double inertia[3][3]; /* kg m^2, body axes */
+    double position[3];   /* centre of mass, world */
+    double rotation[4];   /* x y z w */
     double velocity[3], angular_velocity[3];
     double start_velocity[3], start_angular_velocity[3];
     double push[3], push_torque[3]; /* for the next step */
-    /* What one step works with, from body_prepare: response to an impulse, zero along axes that are not free. */
-    double matrix[3][3];          /* rotation */
-    double inv_mass[3];           /* 1/kg, world axes */
-    double inv_inertia[3][3];     /* 1/(kg m^2), world axes */
+    /* What one step works with, from body_prepare: response to an impulse, zero along axes that are not free.
+     */
+    double matrix[3][3];      /* rotation */
+    double inv_mass[3];       /* 1/kg, world axes */
+    double inv_inertia[3][3]; /* 1/(kg m^2), world axes */
 } Body;
 
-/* Builds a body from its def; `path` names it in messages. position is where the geometry puts the centre of mass. */
+/* Builds a body from its def; `path` names it in messages. position is where the geometry puts the centre of
+ * mass. */
 bool body_make(const SkiffBodyDef *def, const char *path, Body *body, Err *err);
 void body_free(Body *body);
 
-/* Mesh of a geometry in its own rotation and scale, without the translation (which is double precision's business). */
+/* Mesh of a geometry in its own rotation and scale, without the translation (which is double precision's
+ * business). */
 bool geometry_make(const SkiffGeometryDef *def, const char *path, Mesh *mesh, Err *err);
 
-/* Stops the free axes of a body that is still held; gives it its initial velocity in the step of its release. */
+/* Stops the free axes of a body that is still held; gives it its initial velocity in the step of its release.
+ */
 void body_hold(Body *body, double time, double dt);
 /* Rotation matrix and inverse masses for a step that begins at `time`. */
 void body_prepare(Body *body, double time);
 /* Gravity and pushes of one step on the free axes. */
 void body_push(Body *body, const float gravity[3], double time, double dt);
-/* Moves by the velocities; free rotation keeps the angular momentum (the gyroscopic term), renormalises the quaternion. */
+/* Moves by the velocities; free rotation keeps the angular momentum (the gyroscopic term), renormalises the
+ * quaternion. */
 void body_advance(Body *body, double time, double dt);
 bool body_held(const Body *body, double time);
 

@@ -1,5 +1,6 @@
-/* Boundary samples: making, weighing, moving and sorting them, and the terms they give the particles near them. Samples are not visited again after
- * boundary_apply: the solvers work with the contacts [DESIGN sec. 4]. */
+/* Boundary samples: making, weighing, moving and sorting them, and the terms they give the particles near
+ * them. Samples are not visited again after boundary_apply: the solvers work with the contacts [DESIGN sec.
+ * 4]. */
 #include "boundary.h"
 
 #include <math.h>
@@ -26,8 +27,8 @@ static bool samples_grow(BoundarySamples *samples, uint32_t extra) {
     return true;
 }
 
-bool boundary_add(BoundarySet *set, const Mesh *mesh, int32_t object, float spacing, const SampleRegion *region,
-                  const char *path, Err *err) {
+bool boundary_add(BoundarySet *set, const Mesh *mesh, int32_t object, float spacing,
+                  const SampleRegion *region, const char *path, Err *err) {
     enum { MAX_SAMPLES = 50000000 };
     SamplePoint *points = NULL;
     uint32_t count = 0;
@@ -61,7 +62,8 @@ static bool set_reserve(BoundarySet *set, size_t cells, Err *err) {
     if (set->cells.size < (cells + 1) * sizeof(uint32_t) &&
         !buffer_reserve(&set->cells, "boundary cells", (cells + cells / 3 + 1) * sizeof(uint32_t), err))
         return false;
-    if (set->occupied.size < cells && !buffer_reserve(&set->occupied, "boundary occupancy", cells + cells / 3, err))
+    if (set->occupied.size < cells &&
+        !buffer_reserve(&set->occupied, "boundary occupancy", cells + cells / 3, err))
         return false;
     Float4 *world = set->buffer.data;
     float *x = (float *)(world + padded);
@@ -196,9 +198,11 @@ bool boundary_reserve(Boundary *boundary, uint32_t particle_capacity, int body_c
     const uint32_t guess = 4096 + 2 * (boundary->fixed.samples.count + boundary->moving.samples.count);
     if (boundary->contact_capacity < guess)
         boundary->contact_capacity = guess;
-    if (!buffer_reserve(&boundary->contact_buffer, "contacts", boundary->contact_capacity * sizeof(Contact), err) ||
+    if (!buffer_reserve(&boundary->contact_buffer, "contacts", boundary->contact_capacity * sizeof(Contact),
+                        err) ||
         !buffer_reserve(&boundary->span_buffer, "contact spans", blocks * sizeof(ContactSpan), err) ||
-        !buffer_reserve(&boundary->centre_buffer, "object centres", boundary->object_count * sizeof(Float4), err) ||
+        !buffer_reserve(&boundary->centre_buffer, "object centres", boundary->object_count * sizeof(Float4),
+                        err) ||
         !buffer_reserve(&boundary->partial_buffer, "impulse sums",
                         blocks * boundary->object_count * 6 * sizeof(double), err))
         return false;
@@ -208,8 +212,8 @@ bool boundary_reserve(Boundary *boundary, uint32_t particle_capacity, int body_c
     return true;
 }
 
-bool boundary_place(Boundary *boundary, const Body *bodies, int body_count, const double origin[3], float cell_size,
-                    int threads, Err *err) {
+bool boundary_place(Boundary *boundary, const Body *bodies, int body_count, const double origin[3],
+                    float cell_size, int threads, Err *err) {
     for (int b = 0; b < body_count; b++)
         for (int k = 0; k < 3; k++)
             boundary->centres[1 + b][k] = (float)(bodies[b].position[k] - origin[k]);
@@ -232,9 +236,10 @@ bool boundary_place(Boundary *boundary, const Body *bodies, int body_count, cons
     return boundary_sort(set, cell_size, err);
 }
 
-/* One try: contacts of every block, appended to the common list. False: a particle touches too many objects. */
-static bool apply_blocks(Boundary *boundary, const BoundaryJob *job, const Passes *passes, Rows *rows, int threads,
-                         uint32_t *fault) {
+/* One try: contacts of every block, appended to the common list. False: a particle touches too many objects.
+ */
+static bool apply_blocks(Boundary *boundary, const BoundaryJob *job, const Passes *passes, Rows *rows,
+                         int threads, uint32_t *fault) {
     const uint32_t blocks = (job->count + BLOCK - 1) / BLOCK;
     uint32_t used = 0, first_fault = UINT32_MAX;
 #pragma omp parallel num_threads(threads) reduction(min : first_fault)
@@ -264,8 +269,8 @@ static bool apply_blocks(Boundary *boundary, const BoundaryJob *job, const Passe
     return first_fault == UINT32_MAX;
 }
 
-bool boundary_apply(Boundary *boundary, Rows *rows, const Passes *passes, const Particles *particles, int threads,
-                    Err *err) {
+bool boundary_apply(Boundary *boundary, Rows *rows, const Passes *passes, const Particles *particles,
+                    int threads, Err *err) {
     const BoundaryJob job = {.sets = {&boundary->fixed.sorted, &boundary->moving.sorted},
                              .position = (const Float4 *)particles->position,
                              .centres = (const Float4 *)boundary->centres,
@@ -283,7 +288,8 @@ bool boundary_apply(Boundary *boundary, Rows *rows, const Passes *passes, const 
         return true;
     /* the terms are done, only the list was too short: make room and list the contacts alone once more */
     boundary->contact_capacity = boundary->contact_count + boundary->contact_count / 4;
-    if (!buffer_reserve(&boundary->contact_buffer, "contacts", boundary->contact_capacity * sizeof(Contact), err))
+    if (!buffer_reserve(&boundary->contact_buffer, "contacts", boundary->contact_capacity * sizeof(Contact),
+                        err))
         return false;
     boundary->contacts = boundary->contact_buffer.data;
     BoundaryJob again = job;
@@ -291,7 +297,8 @@ bool boundary_apply(Boundary *boundary, Rows *rows, const Passes *passes, const 
     return apply_blocks(boundary, &again, passes, rows, threads, &fault);
 }
 
-void boundary_impulse(const Boundary *boundary, const float *p, uint32_t blocks, double (*totals)[6], int threads) {
+void boundary_impulse(const Boundary *boundary, const float *p, uint32_t blocks, double (*totals)[6],
+                      int threads) {
     const uint32_t objects = boundary->object_count;
     double(*partials)[6] = boundary->partial_buffer.data;
 #pragma omp parallel for schedule(static) num_threads(threads)

@@ -1,4 +1,5 @@
-/* Walls and bodies as samples: one array each for what never moves and for what does. Volumes after [Akinci2012, eq. 4]. */
+/* Walls and bodies as samples: one array each for what never moves and for what does. Volumes after
+ * [Akinci2012, eq. 4]. */
 #ifndef SKIFF_BOUNDARY_H
 #define SKIFF_BOUNDARY_H
 
@@ -6,14 +7,15 @@
 #include "rows.h"
 #include "sample.h"
 
-/* Samples in the order they were made, in their owner's frame (walls: window-local; bodies: body axes about the centre of mass). */
+/* Samples in the order they were made, in their owner's frame (walls: window-local; bodies: body axes about
+ * the centre of mass). */
 typedef struct BoundarySamples {
     uint32_t count, capacity;
     float (*position)[3];
-    float *volume;   /* psi, m^3 */
-    float *area;     /* m^2 */
+    float *volume;      /* psi, m^3 */
+    float *area;        /* m^2 */
     float (*normal)[3]; /* unit, outward of the mesh */
-    int32_t *object; /* 0: tank; 1 + i: body i */
+    int32_t *object;    /* 0: tank; 1 + i: body i */
 } BoundarySamples;
 
 typedef struct BoundarySet {
@@ -26,19 +28,20 @@ typedef struct BoundarySet {
 
 typedef struct Boundary {
     BoundarySet fixed, moving;
-    Float4 *centres;         /* [1 + bodies] window-local centre of every object */
-    Contact *contacts;       /* of this step, grouped by block of particles */
-    ContactSpan *spans;      /* [blocks] */
+    Float4 *centres;    /* [1 + bodies] window-local centre of every object */
+    Contact *contacts;  /* of this step, grouped by block of particles */
+    ContactSpan *spans; /* [blocks] */
     uint32_t contact_count, contact_capacity;
     uint32_t object_count;
     Buffer contact_buffer, span_buffer, centre_buffer, partial_buffer;
 } Boundary;
 
 /* Samples a mesh as it lies, with spacing in m. region NULL: all of it. */
-bool boundary_add(BoundarySet *set, const Mesh *mesh, int32_t object, float spacing, const SampleRegion *region,
-                  const char *path, Err *err);
-/* Volumes psi = 1 / sum W over the set's own samples, as they lie in their frame; then sorts them there. A body is weighed alone, so that a wall
- * it starts beside does not thin it; all that is fixed is weighed together. */
+bool boundary_add(BoundarySet *set, const Mesh *mesh, int32_t object, float spacing,
+                  const SampleRegion *region, const char *path, Err *err);
+/* Volumes psi = 1 / sum W over the set's own samples, as they lie in their frame; then sorts them there. A
+ * body is weighed alone, so that a wall it starts beside does not thin it; all that is fixed is weighed
+ * together. */
 bool boundary_weigh(BoundarySet *set, const Kernel *kernel, Err *err);
 /* Adds weighed samples to another set. */
 bool boundary_append(BoundarySet *set, const BoundarySamples *more, Err *err);
@@ -48,13 +51,15 @@ bool boundary_reserve(Boundary *boundary, uint32_t particle_capacity, int body_c
 /* Sorts a set's world positions into cells of edge h. */
 bool boundary_sort(BoundarySet *set, float cell_size, Err *err);
 /* Moves the bodies' samples to where the bodies are and sorts them. */
-bool boundary_place(Boundary *boundary, const Body *bodies, int body_count, const double origin[3], float cell_size,
-                    int threads, Err *err);
+bool boundary_place(Boundary *boundary, const Body *bodies, int body_count, const double origin[3],
+                    float cell_size, int threads, Err *err);
 /* Boundary terms of all particles: densities and gradient sums are completed, contacts listed. */
-bool boundary_apply(Boundary *boundary, Rows *rows, const Passes *passes, const Particles *particles, int threads,
-                    Err *err);
-/* Sum over the contacts of p_i (g, t) for every object: totals[object][6]; in order, so independent of the threads. */
-void boundary_impulse(const Boundary *boundary, const float *p, uint32_t blocks, double (*totals)[6], int threads);
+bool boundary_apply(Boundary *boundary, Rows *rows, const Passes *passes, const Particles *particles,
+                    int threads, Err *err);
+/* Sum over the contacts of p_i (g, t) for every object: totals[object][6]; in order, so independent of the
+ * threads. */
+void boundary_impulse(const Boundary *boundary, const float *p, uint32_t blocks, double (*totals)[6],
+                      int threads);
 void boundary_free(Boundary *boundary);
 
 #endif

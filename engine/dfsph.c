@@ -1,17 +1,21 @@
 /* Pressure solves: the operator, and two ways to invert it.
  *
- * Unknown: P_i = p_i dt^2 / rho0 >= 0 (m^2). With V gradW_ij packed in the rows, G_i = sum_j V gradW_ij + g_i, D the divergence and D^T its transpose:
- *   velocity change  -(D^T P)_i / dt,  (D^T P)_i = P_i G_i + sum_j P_j V gradW_ij;
- *   density change in one step, relative to rho0:  dt (D v)_i = dt (v_i . G_i - sum_j v_j . V gradW_ij - sum_b v_b . g_ib - omega_b . t_ib).
- * A = D D^T is symmetric positive semidefinite. A body takes part as six more unknown velocities: it answers a pressure field by
- * -(m / M) sum_i P_i g_ib and -m I^-1 sum_i P_i t_ib, which keeps A symmetric and couples light bodies without substeps.
+ * Unknown: P_i = p_i dt^2 / rho0 >= 0 (m^2). With V gradW_ij packed in the rows, G_i = sum_j V gradW_ij +
+ * g_i, D the divergence and D^T its transpose: velocity change  -(D^T P)_i / dt,  (D^T P)_i = P_i G_i + sum_j
+ * P_j V gradW_ij; density change in one step, relative to rho0:  dt (D v)_i = dt (v_i . G_i - sum_j v_j . V
+ * gradW_ij - sum_b v_b . g_ib - omega_b . t_ib). A = D D^T is symmetric positive semidefinite. A body takes
+ * part as six more unknown velocities: it answers a pressure field by
+ * -(m / M) sum_i P_i g_ib and -m I^-1 sum_i P_i t_ib, which keeps A symmetric and couples light bodies
+ * without substeps.
  *
- * Density solve: gamma (rho / rho0 - 1) + dt D v - A P <= 0, P >= 0, and zero where P > 0. gamma < 1 corrects a density error over about 1 / gamma
- * steps: with 1 a residual comes back doubled in the next step, once through the density and once through the velocity, and every step has to work it off
- * again. Divergence solve: the same with dt D v alone.
+ * Density solve: gamma (rho / rho0 - 1) + dt D v - A P <= 0, P >= 0, and zero where P > 0. gamma < 1 corrects
+ * a density error over about 1 / gamma steps: with 1 a residual comes back doubled in the next step, once
+ * through the density and once through the velocity, and every step has to work it off again. Divergence
+ * solve: the same with dt D v alone.
  *
- * gcr: conjugate residuals (GCR with one direction kept) preconditioned by the diagonal, on the set where P > 0 or the residual is positive,
- * projected to P >= 0 after each step. jacobi: relaxed Jacobi as in the papers, compression only. Both count applications of A. */
+ * gcr: conjugate residuals (GCR with one direction kept) preconditioned by the diagonal, on the set where P >
+ * 0 or the residual is positive, projected to P >= 0 after each step. jacobi: relaxed Jacobi as in the
+ * papers, compression only. Both count applications of A. */
 #include "dfsph.h"
 
 #include <math.h>
@@ -20,7 +24,8 @@
 static const float MIN_DIAGONAL = 1e-6f;
 /* The divergence solve leaves out particles with fewer neighbours: spray has no divergence to speak of. */
 enum { MIN_NEIGHBOURS = 20 };
-/* The two-sided residual goes this far below the one-sided tolerance, so that the usual error, measured at the next step, keeps it. */
+/* The two-sided residual goes this far below the one-sided tolerance, so that the usual error, measured at
+ * the next step, keeps it. */
 static const double SAFETY = 0.3;
 
 bool dfsph_reserve(Dfsph *dfsph, uint32_t particle_capacity, uint32_t object_count, Err *err) {
@@ -74,10 +79,11 @@ static void total_partials(const Dfsph *dfsph, uint32_t blocks, int count, doubl
             totals[k] += dfsph->partials[block * DFSPH_SUMS + (uint32_t)k];
 }
 
-#define EACH_BLOCK _Pragma("omp parallel for schedule(static) num_threads(problem->threads)")                \
-    for (uint32_t block = 0; block < blocks; block++)
+#define EACH_BLOCK                                                                                           \
+    _Pragma("omp parallel for schedule(static) num_threads(problem->threads)") for (uint32_t block = 0;      \
+                                                                                    block < blocks; block++)
 #define EACH_SLICE for (uint32_t first = block * BLOCK; first < (block + 1) * BLOCK; first += SLICE)
-#define EACH_LANE for (uint32_t l = 0; l < LANES; l++)
+#define EACH_LANE  for (uint32_t l = 0; l < LANES; l++)
 
 /* ---- The operator ---- */
 
@@ -104,7 +110,8 @@ static void apply_transpose(Dfsph *dfsph, const DfsphProblem *problem, const flo
 }
 
 /* Takes the motion of walls and bodies out of a divergence: velocities[object] = (v, omega). */
-static void subtract_bodies(const Boundary *boundary, const double (*velocities)[6], float *result, uint32_t block) {
+static void subtract_bodies(const Boundary *boundary, const double (*velocities)[6], float *result,
+                            uint32_t block) {
     const ContactSpan span = boundary->spans[block];
     for (uint32_t c = span.start; c < span.start + span.count; c++) {
         const Contact *contact = &boundary->contacts[c];
@@ -125,8 +132,10 @@ static void divergence_block(const Dfsph *dfsph, const DfsphProblem *problem, co
         subtract_bodies(problem->boundary, velocities, result, block);
 }
 
-/* Velocity change -D^T p / dt of fluid (from `velocity` to `result`) and, if asked, of the bodies themselves. */
-static void apply_pressure(Dfsph *dfsph, const DfsphProblem *problem, const Float4 *velocity, Float4 *result) {
+/* Velocity change -D^T p / dt of fluid (from `velocity` to `result`) and, if asked, of the bodies themselves.
+ */
+static void apply_pressure(Dfsph *dfsph, const DfsphProblem *problem, const Float4 *velocity,
+                           Float4 *result) {
     const uint32_t blocks = particles_blocks(problem->particles);
     const float scale = 1.0f / problem->params->time_step;
     const Float4 *acceleration = (const Float4 *)dfsph->acceleration;
@@ -144,7 +153,8 @@ static void body_velocities(const Dfsph *dfsph, const DfsphProblem *problem, dou
     for (int b = 0; b < problem->body_count; b++)
         for (int k = 0; k < 3; k++) {
             velocities[1 + b][k] = problem->bodies[b].velocity[k] - scale * dfsph->responses[1 + b][k];
-            velocities[1 + b][3 + k] = problem->bodies[b].angular_velocity[k] - scale * dfsph->responses[1 + b][3 + k];
+            velocities[1 + b][3 + k] =
+                problem->bodies[b].angular_velocity[k] - scale * dfsph->responses[1 + b][3 + k];
         }
 }
 
@@ -163,7 +173,8 @@ static inline void error_lanes(const float *residual, const float *p, LaneSum *o
     }
 }
 
-static inline void precondition_lanes(const float *residual, const float *p, const float *inv_diagonal, float *z) {
+static inline void precondition_lanes(const float *residual, const float *p, const float *inv_diagonal,
+                                      float *z) {
     EACH_LANE {
         z[l] = p[l] > 0.0f || residual[l] > 0.0f ? residual[l] * inv_diagonal[l] : 0.0f;
     }
@@ -182,19 +193,22 @@ static Errors evaluate_residual(Dfsph *dfsph, const DfsphProblem *problem, Solve
     const float *density = problem->rows->pairs.density;
     float *residual = dfsph->residual;
     EACH_BLOCK {
-        divergence_block(dfsph, problem, (const Float4 *)dfsph->guess, (const double(*)[6])velocities, residual, block);
+        divergence_block(dfsph, problem, (const Float4 *)dfsph->guess, (const double(*)[6])velocities,
+                         residual, block);
         LaneSum one = {0}, two = {0};
         EACH_SLICE {
             EACH_LANE {
                 const uint32_t i = first + l;
                 const float excess = density[i] - 1.0f;
-                /* where there is room to the rest density, approaching is no fault: thin water falls together freely */
+                /* where there is room to the rest density, approaching is no fault: thin water falls together
+                 * freely */
                 const float term = kind == SOLVE_DENSITY ? gamma * excess : excess < 0.0f ? excess : 0.0f;
                 const float r = term + dt * residual[i];
                 residual[i] = dfsph->inv_diagonal[i] > 0.0f ? r : 0.0f;
             }
             error_lanes(residual + first, p + first, &one, &two);
-            precondition_lanes(residual + first, p + first, dfsph->inv_diagonal + first, dfsph->preconditioned + first);
+            precondition_lanes(residual + first, p + first, dfsph->inv_diagonal + first,
+                               dfsph->preconditioned + first);
         }
         dfsph->partials[block * DFSPH_SUMS] = lane_total(&one);
         dfsph->partials[block * DFSPH_SUMS + 1] = lane_total(&two);
@@ -208,7 +222,8 @@ static Errors evaluate_residual(Dfsph *dfsph, const DfsphProblem *problem, Solve
 static void prepare(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, float *p) {
     const uint32_t blocks = particles_blocks(problem->particles);
     const uint32_t count = problem->particles->count;
-    const float warm = kind == SOLVE_DENSITY ? problem->params->warm_start : problem->params->warm_start_divergence;
+    const float warm =
+        kind == SOLVE_DENSITY ? problem->params->warm_start : problem->params->warm_start_divergence;
     const Float4 *gradient_sum = problem->rows->pairs.gradient_sum;
     EACH_BLOCK {
         for (uint32_t i = block * BLOCK; i < (block + 1) * BLOCK; i++) {
@@ -226,16 +241,18 @@ typedef struct GcrSums {
     double old_new, new_new, old_old, residual_new, residual_old;
 } GcrSums;
 
-/* new_image = A preconditioned, and the dot products a step needs, weighted by the inverse diagonal over the active set. */
+/* new_image = A preconditioned, and the dot products a step needs, weighted by the inverse diagonal over the
+ * active set. */
 static GcrSums gcr_apply(Dfsph *dfsph, const DfsphProblem *problem, const float *p) {
     const uint32_t blocks = particles_blocks(problem->particles);
     apply_transpose(dfsph, problem, dfsph->preconditioned);
     EACH_BLOCK {
-        divergence_block(dfsph, problem, (const Float4 *)dfsph->acceleration, (const double(*)[6])dfsph->responses,
-                         dfsph->new_image, block);
+        divergence_block(dfsph, problem, (const Float4 *)dfsph->acceleration,
+                         (const double(*)[6])dfsph->responses, dfsph->new_image, block);
         LaneSum sums[5] = {0};
         EACH_SLICE {
-            const float *r = dfsph->residual + first, *q = dfsph->image + first, *w = dfsph->new_image + first;
+            const float *r = dfsph->residual + first, *q = dfsph->image + first,
+                        *w = dfsph->new_image + first;
             const float *inv = dfsph->inv_diagonal + first, *pressure = p + first;
             EACH_LANE {
                 const float weight = pressure[l] > 0.0f || r[l] > 0.0f ? inv[l] : 0.0f;
@@ -255,8 +272,10 @@ static GcrSums gcr_apply(Dfsph *dfsph, const DfsphProblem *problem, const float 
     return (GcrSums){t[0], t[1], t[2], t[3], t[4]};
 }
 
-/* One step along the new direction: d = z - beta d, q = A d, P = max(0, P + alpha d). Returns what the projection cut, weighted by the diagonal. */
-static double gcr_update(Dfsph *dfsph, const DfsphProblem *problem, float *p, float alpha, float beta, Errors *errors) {
+/* One step along the new direction: d = z - beta d, q = A d, P = max(0, P + alpha d). Returns what the
+ * projection cut, weighted by the diagonal. */
+static double gcr_update(Dfsph *dfsph, const DfsphProblem *problem, float *p, float alpha, float beta,
+                         Errors *errors) {
     const uint32_t blocks = particles_blocks(problem->particles);
     EACH_BLOCK {
         LaneSum one = {0}, two = {0}, cut = {0};
@@ -291,7 +310,8 @@ typedef struct SolveLimits {
     int min, max;
 } SolveLimits;
 
-static SolveResult solve_gcr(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, float *p, SolveLimits limits) {
+static SolveResult solve_gcr(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, float *p,
+                             SolveLimits limits) {
     const double tolerance = SAFETY * limits.tolerance;
     Errors errors = evaluate_residual(dfsph, problem, kind, p);
     int iterations = 1;
@@ -348,7 +368,8 @@ SolveResult dfsph_solve(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kin
     float *p = kind == SOLVE_DENSITY ? problem->particles->pressure : problem->particles->pressure_divergence;
     const SolveLimits limits =
         kind == SOLVE_DENSITY
-            ? (SolveLimits){(double)params->max_density_error / 100.0, params->min_iterations, params->max_iterations}
+            ? (SolveLimits){(double)params->max_density_error / 100.0, params->min_iterations,
+                            params->max_iterations}
             : (SolveLimits){(double)params->max_divergence_error / 100.0, params->min_divergence_iterations,
                             params->max_divergence_iterations};
     dfsph->moving = problem->boundary->moving.samples.count != 0;

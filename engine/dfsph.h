@@ -1,5 +1,5 @@
-/* The pressure solves of DFSPH [Bender & Koschier 2017; Carensac2023 appendix A]: which pressures keep the density, and the velocity's divergence,
- * where they should be. */
+/* The pressure solves of DFSPH [Bender & Koschier 2017; Carensac2023 appendix A]: which pressures keep the
+ * density, and the velocity's divergence, where they should be. */
 #ifndef SKIFF_DFSPH_H
 #define SKIFF_DFSPH_H
 
@@ -8,19 +8,19 @@
 typedef enum SolveKind { SOLVE_DIVERGENCE, SOLVE_DENSITY } SolveKind;
 
 typedef struct SolveResult {
-    int iterations;        /* applications of the operator, the one for the warm start included */
-    double error;          /* mean over all particles of max(0, residual), relative density */
-    double residual;       /* mean two-sided residual: |r| where there is pressure, max(0, r) elsewhere */
+    int iterations;  /* applications of the operator, the one for the warm start included */
+    double error;    /* mean over all particles of max(0, residual), relative density */
+    double residual; /* mean two-sided residual: |r| where there is pressure, max(0, r) elsewhere */
 } SolveResult;
 
 typedef struct Dfsph {
     Float4 *acceleration; /* D^T p */
     Float4 *guess;        /* velocity after the pressure so far */
     float *residual, *preconditioned, *direction, *image, *new_image, *inv_diagonal;
-    double *partials;     /* [blocks][DFSPH_SUMS] */
-    double (*impulses)[6]; /* [objects] sums of boundary_impulse */
+    double *partials;       /* [blocks][DFSPH_SUMS] */
+    double (*impulses)[6];  /* [objects] sums of boundary_impulse */
     double (*responses)[6]; /* [objects] a body's answer: (D^T p) of its six velocities */
-    bool moving;          /* any object has a velocity or may get one */
+    bool moving;            /* any object has a velocity or may get one */
     Buffer buffer;
 } Dfsph;
 
@@ -41,8 +41,8 @@ typedef struct DfsphProblem {
 bool dfsph_reserve(Dfsph *dfsph, uint32_t particle_capacity, uint32_t object_count, Err *err);
 void dfsph_free(Dfsph *dfsph);
 
-/* Solves for the pressure field of `kind` (particles->pressure or pressure_divergence, warm start in, result out) and changes the velocities of
- * fluid and bodies by it. */
+/* Solves for the pressure field of `kind` (particles->pressure or pressure_divergence, warm start in, result
+ * out) and changes the velocities of fluid and bodies by it. */
 SolveResult dfsph_solve(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind);
 
 #endif

@@ -1,5 +1,6 @@
-/* Counting sort of the particles by cell. Each thread counts and later moves one contiguous part of the particles, and the parts are taken in
- * order within a cell, so the sort is stable and its result does not depend on the number of threads. */
+/* Counting sort of the particles by cell. Each thread counts and later moves one contiguous part of the
+ * particles, and the parts are taken in order within a cell, so the sort is stable and its result does not
+ * depend on the number of threads. */
 #include "grid.h"
 
 #include <math.h>
@@ -10,8 +11,10 @@ enum { MAX_PARTS = 8 };
 static void grid_bounds(const Particles *particles, GridBounds *bounds, int threads) {
     float min_x = INFINITY, min_y = INFINITY, min_z = INFINITY, max_x = -INFINITY, max_y = -INFINITY,
           max_z = -INFINITY;
-#pragma omp parallel for schedule(static) num_threads(threads) reduction(min : min_x, min_y, min_z)           \
-    reduction(max : max_x, max_y, max_z)
+#pragma omp parallel for schedule(static) num_threads(threads) reduction(min                                 \
+                                                                         : min_x, min_y, min_z)              \
+    reduction(max                                                                                            \
+              : max_x, max_y, max_z)
     for (uint32_t i = 0; i < particles->count; i++) {
         const float *p = particles->position[i];
         min_x = fminf(min_x, p[0]);
@@ -27,7 +30,8 @@ static void grid_bounds(const Particles *particles, GridBounds *bounds, int thre
 bool grid_layout(CellGrid *cells, const GridBounds *bounds, float cell_size, int margin) {
     double total = 1.0;
     for (int k = 0; k < 3; k++) {
-        /* origins on multiples of the cell size: a particle changes cell only when it moves, not when the bounds do */
+        /* origins on multiples of the cell size: a particle changes cell only when it moves, not when the
+         * bounds do */
         const double low = floor((double)bounds->min[k] / cell_size) - margin;
         const double high = floor((double)bounds->max[k] / cell_size) + margin;
         if (!(high - low < (double)GRID_MAX_CELLS))
@@ -65,7 +69,8 @@ static bool grid_reserve(Grid *grid, const Particles *particles, size_t cells, i
     const size_t padded = particles->capacity + SLICE;
     /* a third more than asked, so that slowly growing bounds do not allocate in every step */
     const size_t table = (cells + 2) * sizeof(uint32_t);
-    if (grid->start_buffer.size < table && !buffer_reserve(&grid->start_buffer, "cell starts", table + table / 3, err))
+    if (grid->start_buffer.size < table &&
+        !buffer_reserve(&grid->start_buffer, "cell starts", table + table / 3, err))
         return false;
     const size_t histograms = (size_t)parts * (cells + 2) * sizeof(uint32_t);
     if (grid->histogram_buffer.size < histograms &&
@@ -82,7 +87,8 @@ static bool grid_reserve(Grid *grid, const Particles *particles, size_t cells, i
 }
 
 /* Fills cell, order and the starts; `outside` particles go to the cell after the last. */
-static void counting_sort(Grid *grid, const Particles *particles, const GridBounds *domain, bool check, int parts) {
+static void counting_sort(Grid *grid, const Particles *particles, const GridBounds *domain, bool check,
+                          int parts) {
     const CellGrid *cells = &grid->cells;
     const uint32_t cell_count = (uint32_t)(cells->size[0] * cells->size[1] * cells->size[2]);
     uint32_t *unsorted = grid->unsorted_buffer.data, *histograms = grid->histogram_buffer.data;
@@ -140,12 +146,13 @@ bool grid_sort(Grid *grid, Particles *particles, float cell_size, const GridBoun
         outside = count_outside(particles, domain, &first);
         if (removed == NULL) {
             const float *p = particles->position[first];
-            return err_set(err, ERR_DIVERGED,
-                           "particle %llu left the domain: it is at (%g, %g, %g) m (window-local), the domain is "
-                           "(%g, %g, %g) to (%g, %g, %g) m; %u particles in all are outside",
-                           (unsigned long long)particles->id[first], (double)p[0], (double)p[1], (double)p[2],
-                           (double)domain->min[0], (double)domain->min[1], (double)domain->min[2],
-                           (double)domain->max[0], (double)domain->max[1], (double)domain->max[2], outside);
+            return err_set(
+                err, ERR_DIVERGED,
+                "particle %llu left the domain: it is at (%g, %g, %g) m (window-local), the domain is "
+                "(%g, %g, %g) to (%g, %g, %g) m; %u particles in all are outside",
+                (unsigned long long)particles->id[first], (double)p[0], (double)p[1], (double)p[2],
+                (double)domain->min[0], (double)domain->min[1], (double)domain->min[2],
+                (double)domain->max[0], (double)domain->max[1], (double)domain->max[2], outside);
         }
         for (int k = 0; k < 3; k++) {
             bounds.min[k] = fminf(fmaxf(bounds.min[k], domain->min[k]), domain->max[k]);
@@ -155,7 +162,8 @@ bool grid_sort(Grid *grid, Particles *particles, float cell_size, const GridBoun
     if (!grid_layout(&grid->cells, &bounds, cell_size, 1))
         return err_set(err, ERR_DIVERGED, "the fluid spreads over more than %d cells of %g m", GRID_MAX_CELLS,
                        (double)cell_size);
-    const size_t cells = (size_t)grid->cells.size[0] * (size_t)grid->cells.size[1] * (size_t)grid->cells.size[2];
+    const size_t cells =
+        (size_t)grid->cells.size[0] * (size_t)grid->cells.size[1] * (size_t)grid->cells.size[2];
     const int parts = threads < MAX_PARTS ? threads : MAX_PARTS;
     if (!grid_reserve(grid, particles, cells, parts, err))
         return false;

@@ -17,13 +17,15 @@ typedef struct GridBounds {
 
 enum { GRID_MAX_CELLS = 1 << 27 };
 
-/* Sorts the particles by cell, stably; those outside `domain` are removed and counted in *removed, or are an error when `removed` is NULL
- * (ERR_DIVERGED naming the particle). Cells come from the particles' own bounds, so an empty sky costs nothing. */
+/* Sorts the particles by cell, stably; those outside `domain` are removed and counted in *removed, or are an
+ * error when `removed` is NULL (ERR_DIVERGED naming the particle). Cells come from the particles' own bounds,
+ * so an empty sky costs nothing. */
 bool grid_sort(Grid *grid, Particles *particles, float cell_size, const GridBounds *domain, uint32_t *removed,
                int threads, Err *err);
 void grid_free(Grid *grid);
 
-/* Cell table over given bounds: origin and size set, one empty layer around (`margin` layers). False when it would have more than GRID_MAX_CELLS. */
+/* Cell table over given bounds: origin and size set, one empty layer around (`margin` layers). False when it
+ * would have more than GRID_MAX_CELLS. */
 bool grid_layout(CellGrid *cells, const GridBounds *bounds, float cell_size, int margin);
 
 static inline uint32_t grid_cell_of(const CellGrid *cells, const float *p) {

@@ -8,9 +8,9 @@
 #include <math.h>
 
 typedef struct Kernel {
-    float support;     /* h, m */
-    float inv_support; /* 1/m */
-    float w_scale;     /* k, 1/m^3: also W(0) */
+    float support;        /* h, m */
+    float inv_support;    /* 1/m */
+    float w_scale;        /* k, 1/m^3: also W(0) */
     float gradient_scale; /* l, 1/m^4 */
 } Kernel;
 

@@ -73,8 +73,8 @@ bool skiff_params_check(const SkiffParams *params, Err *err) {
         if ((float)low >= (float)info->min && (float)high <= (float)max)
             continue;
         const double bad = (float)low >= (float)info->min ? high : low;
-        good = err_add(err, ERR_INPUT, "Configuration.%s: %g is out of range, allowed is %g to %g%s%s", info->key, bad,
-                       info->min, max, info->unit[0] ? " " : "", info->unit);
+        good = err_add(err, ERR_INPUT, "Configuration.%s: %g is out of range, allowed is %g to %g%s%s",
+                       info->key, bad, info->min, max, info->unit[0] ? " " : "", info->unit);
     }
     return good;
 }
@@ -116,7 +116,8 @@ SkiffBlockDef skiff_block_default(void) {
 }
 
 SkiffBodyDef skiff_body_default(void) {
-    return (SkiffBodyDef){.geometry = skiff_geometry_default(), .density = 1000.0f, .free_axes = SKIFF_FREE_ALL};
+    return (SkiffBodyDef){
+        .geometry = skiff_geometry_default(), .density = 1000.0f, .free_axes = SKIFF_FREE_ALL};
 }
 
 SkiffProbeDef skiff_probe_default(void) {

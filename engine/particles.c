@@ -69,11 +69,13 @@ void particles_permute(Particles *particles, const uint32_t *order, uint32_t cou
     for (uint32_t block = 0; block < blocks; block++) {
         const uint32_t begin = block * BLOCK, end = begin + BLOCK < count ? begin + BLOCK : count;
         for (int f = 0; f < PARTICLE_FIELD_COUNT; f++)
-            permute_field(&particle_fields[f], particles->front[f].data, particles->back[f].data, order, begin, end);
+            permute_field(&particle_fields[f], particles->front[f].data, particles->back[f].data, order,
+                          begin, end);
     }
     for (int f = 0; f < PARTICLE_FIELD_COUNT; f++) {
         const size_t size = particle_fields[f].size;
-        memset((char *)particles->back[f].data + count * size, 0, ((size_t)blocks * BLOCK + SLICE - count) * size);
+        memset((char *)particles->back[f].data + count * size, 0,
+               ((size_t)blocks * BLOCK + SLICE - count) * size);
         const Buffer swap = particles->front[f];
         particles->front[f] = particles->back[f];
         particles->back[f] = swap;
@@ -82,7 +84,8 @@ void particles_permute(Particles *particles, const uint32_t *order, uint32_t cou
     particles_bind(particles);
 }
 
-uint32_t particles_append(Particles *particles, const float position[3], const float velocity[3], double birth) {
+uint32_t particles_append(Particles *particles, const float position[3], const float velocity[3],
+                          double birth) {
     assert(particles->count < particles->capacity);
     const uint32_t i = particles->count++;
     for (int k = 0; k < 3; k++) {

@@ -1,4 +1,5 @@
-/* The fluid's particles: one array a field (particles.inl), padded to whole blocks, double-buffered for the sort. */
+/* The fluid's particles: one array a field (particles.inl), padded to whole blocks, double-buffered for the
+ * sort. */
 #ifndef SKIFF_PARTICLES_H
 #define SKIFF_PARTICLES_H
 
@@ -41,11 +42,13 @@ void particles_free(Particles *particles);
 /* Field data, count elements. */
 void *particles_data(Particles *particles, ParticleFieldId field);
 
-/* New particle k of the sorted order is old particle order[k]; the first `count` stay. Zeroes the padding after them. */
+/* New particle k of the sorted order is old particle order[k]; the first `count` stay. Zeroes the padding
+ * after them. */
 void particles_permute(Particles *particles, const uint32_t *order, uint32_t count, int threads);
 
 /* Appends one particle; the capacity must hold it. Returns its index. */
-uint32_t particles_append(Particles *particles, const float position[3], const float velocity[3], double birth);
+uint32_t particles_append(Particles *particles, const float position[3], const float velocity[3],
+                          double birth);
 
 /* Blocks of BLOCK particles that cover the fluid. */
 static inline uint32_t particles_blocks(const Particles *particles) {

@@ -1,23 +1,25 @@
-/* The pair loops, compiled once per instruction set (PASSES_ISA is plain, avx2 or avx512; see passes.h for the ideas).
+/* The pair loops, compiled once per instruction set (PASSES_ISA is plain, avx2 or avx512; see passes.h for
+ * the ideas).
  *
- * A particle is a lane: sixteen particles advance together through their k-th neighbours. Every sum is thereby taken over the
- * neighbours in row order with one fused multiply-add each, whatever the register width, and no horizontal sum is needed. */
+ * A particle is a lane: sixteen particles advance together through their k-th neighbours. Every sum is
+ * thereby taken over the neighbours in row order with one fused multiply-add each, whatever the register
+ * width, and no horizontal sum is needed. */
 
-#define PASSES_AVX512 1
-#define PASSES_AVX2 2
-#define PASSES_PLAIN 3
-#define PASSES_avx512 PASSES_AVX512
-#define PASSES_avx2 PASSES_AVX2
-#define PASSES_plain PASSES_PLAIN
+#define PASSES_AVX512      1
+#define PASSES_AVX2        2
+#define PASSES_PLAIN       3
+#define PASSES_avx512      PASSES_AVX512
+#define PASSES_avx2        PASSES_AVX2
+#define PASSES_plain       PASSES_PLAIN
 #define PASSES_JOIN_(a, b) a##b
-#define PASSES_JOIN(a, b) PASSES_JOIN_(a, b)
+#define PASSES_JOIN(a, b)  PASSES_JOIN_(a, b)
 #if PASSES_JOIN(PASSES_, PASSES_ISA) == PASSES_AVX512
 #define SIMD_AVX512
 #elif PASSES_JOIN(PASSES_, PASSES_ISA) == PASSES_AVX2
 #define SIMD_AVX2
 #endif
 #define PASSES_TEXT_(a) #a
-#define PASSES_TEXT(a) PASSES_TEXT_(a)
+#define PASSES_TEXT(a)  PASSES_TEXT_(a)
 
 #include "passes.h"
 
@@ -76,9 +78,10 @@ static bool gather_candidates(const SearchJob *job, uint32_t cell, Scratch *scra
 }
 
 /* Neighbours of particle i in the order of the candidates; -1 when there are too many. */
-static int find_neighbours(const SearchJob *job, const Candidates *candidates, uint32_t i, const Scratch *scratch,
-                           int32_t *list) {
-    const Vf x = vf_set(job->position[i][0]), y = vf_set(job->position[i][1]), z = vf_set(job->position[i][2]);
+static int find_neighbours(const SearchJob *job, const Candidates *candidates, uint32_t i,
+                           const Scratch *scratch, int32_t *list) {
+    const Vf x = vf_set(job->position[i][0]), y = vf_set(job->position[i][1]),
+             z = vf_set(job->position[i][2]);
     const Vf limit = vf_set(job->kernel.support * job->kernel.support);
     const int self = (int)i + candidates->self_shift;
     int n = 0;
@@ -109,7 +112,8 @@ static inline int16_t *entry_gradient(const uint8_t *entries, uint32_t entry, bo
                 : (int16_t *)((const RowEntry *)entries)[entry].gradient[0];
 }
 
-/* Turns the sixteen lists in scratch into row entries, densities and gradient sums. True if all offsets fit 16 bits or wide. */
+/* Turns the sixteen lists in scratch into row entries, densities and gradient sums. True if all offsets fit
+ * 16 bits or wide. */
 static bool pack_slice(const SearchJob *job, uint32_t first, const int32_t counts[SLICE], int length,
                        uint32_t entry, const Scratch *scratch) {
     const int32_t stride = MAX_NEIGHBOURS + LANES;
@@ -257,7 +261,8 @@ static bool contact_add(const BoundaryJob *job, const SampleSet *set, uint32_t s
     return true;
 }
 
-static bool contacts_of_particle(const BoundaryJob *job, const SampleSet *set, const float *p, ContactSums *sums) {
+static bool contacts_of_particle(const BoundaryJob *job, const SampleSet *set, const float *p,
+                                 ContactSums *sums) {
     int32_t c[3];
     for (int k = 0; k < 3; k++) {
         c[k] = (int32_t)floorf((p[k] - set->grid.origin[k]) * set->grid.inv_size);
@@ -273,7 +278,8 @@ static bool contacts_of_particle(const BoundaryJob *job, const SampleSet *set, c
         const int32_t middle = cell + (run / 3 - 1) * slab + (run % 3 - 1) * column;
         const uint32_t end = set->grid.start[middle + 2];
         for (uint32_t s = set->grid.start[middle - 1]; s < end; s += LANES) {
-            const Vf d[3] = {vf_sub(vf_set(p[0]), vf_load(set->x + s)), vf_sub(vf_set(p[1]), vf_load(set->y + s)),
+            const Vf d[3] = {vf_sub(vf_set(p[0]), vf_load(set->x + s)),
+                             vf_sub(vf_set(p[1]), vf_load(set->y + s)),
                              vf_sub(vf_set(p[2]), vf_load(set->z + s))};
             const Vf distance_sq = vf_fma(d[0], d[0], vf_fma(d[1], d[1], vf_mul(d[2], d[2])));
             const uint32_t valid = end - s >= LANES ? 0xffffu : (1u << (end - s)) - 1u;
@@ -292,7 +298,8 @@ static int boundary(const BoundaryJob *job, uint32_t block, Scratch *scratch, ui
         ContactSums sums;
         sums.count = 0;
         for (int k = 0; k < 2; k++) {
-            if (job->sets[k]->count != 0 && !contacts_of_particle(job, job->sets[k], job->position[i], &sums)) {
+            if (job->sets[k]->count != 0 &&
+                !contacts_of_particle(job, job->sets[k], job->position[i], &sums)) {
                 *fault = i;
                 return -1;
             }
@@ -395,8 +402,9 @@ static void divergence(const PairData *pairs, const Float4 *v, float *result, ui
 
 /* ---- Gravity and viscosity ---- */
 
-/* XSPH [Schechter & Bridson 2012] without its division by the density: that makes the weights symmetric, and what i gives j gets. The
- * weights are made again from the positions: storing them would make every iteration's stream a quarter wider. */
+/* XSPH [Schechter & Bridson 2012] without its division by the density: that makes the weights symmetric, and
+ * what i gives j gets. The weights are made again from the positions: storing them would make every
+ * iteration's stream a quarter wider. */
 static void forces(const ForceJob *job, uint32_t block) {
     const PairData *pairs = job->pairs;
     const Vf share = vf_set(-job->viscosity * pairs->volume);

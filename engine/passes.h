@@ -1,9 +1,9 @@
-/* The hot loops: everything that visits particle pairs. One text (passes.c) compiled once per instruction set; a table of functions
- * each; all tables give the same bits.
+/* The hot loops: everything that visits particle pairs. One text (passes.c) compiled once per instruction
+ * set; a table of functions each; all tables give the same bits.
  *
- * Particles are sorted by cell. Sixteen consecutive ones form a slice, 64 slices a block. A block is the unit of scheduling and of
- * summation: whatever thread runs it, it writes its own particles only, and sums over particles are taken per block and then over the blocks
- * in order. */
+ * Particles are sorted by cell. Sixteen consecutive ones form a slice, 64 slices a block. A block is the unit
+ * of scheduling and of summation: whatever thread runs it, it writes its own particles only, and sums over
+ * particles are taken per block and then over the blocks in order. */
 #ifndef SKIFF_PASSES_H
 #define SKIFF_PASSES_H
 
@@ -14,17 +14,18 @@
 #include <stdint.h>
 
 enum {
-    SLICE = LANES,            /* particles a slice */
-    BLOCK_SLICES = 64,        /* slices a block */
+    SLICE = LANES,     /* particles a slice */
+    BLOCK_SLICES = 64, /* slices a block */
     BLOCK = SLICE * BLOCK_SLICES,
-    MAX_NEIGHBOURS = 496,     /* fluid neighbours a particle may have; at rest it has 34 */
-    MAX_CANDIDATES = 8192,    /* particles in the 27 cells around one */
-    MAX_CONTACT_OBJECTS = 8   /* walls and bodies that may touch one particle */
+    MAX_NEIGHBOURS = 496,   /* fluid neighbours a particle may have; at rest it has 34 */
+    MAX_CANDIDATES = 8192,  /* particles in the 27 cells around one */
+    MAX_CONTACT_OBJECTS = 8 /* walls and bodies that may touch one particle */
 };
 
-/* One k-th neighbour for each of a slice's sixteen particles, two cache lines: the neighbour as offset from the slice's first
- * particle, and V grad W in units of its largest possible magnitude / 32767. Fixed point is ten times as accurate as half precision where it
- * matters, exactly antisymmetric, and needs no special instruction. Unused places point at the particle itself with gradient 0. */
+/* One k-th neighbour for each of a slice's sixteen particles, two cache lines: the neighbour as offset from
+ * the slice's first particle, and V grad W in units of its largest possible magnitude / 32767. Fixed point is
+ * ten times as accurate as half precision where it matters, exactly antisymmetric, and needs no special
+ * instruction. Unused places point at the particle itself with gradient 0. */
 typedef struct RowEntry {
     int16_t index[SLICE];
     int16_t gradient[3][SLICE];
@@ -36,12 +37,12 @@ typedef struct RowEntryWide {
     int16_t gradient[3][SLICE];
 } RowEntryWide;
 
-/* Cells of edge h over the particles' bounds with one empty layer around; y fastest, then z, then x: the three cells of a column that a
- * particle sees are one contiguous run of particles. */
+/* Cells of edge h over the particles' bounds with one empty layer around; y fastest, then z, then x: the
+ * three cells of a column that a particle sees are one contiguous run of particles. */
 typedef struct CellGrid {
-    float origin[3]; /* m */
-    float inv_size;  /* 1/m */
-    int32_t size[3]; /* cells along x, y, z */
+    float origin[3];       /* m */
+    float inv_size;        /* 1/m */
+    int32_t size[3];       /* cells along x, y, z */
     const uint32_t *start; /* [cells + 1] first particle of a cell */
 } CellGrid;
 
@@ -49,13 +50,14 @@ static inline int32_t cell_grid_index(const CellGrid *grid, int32_t x, int32_t y
     return (x * grid->size[2] + z) * grid->size[1] + y;
 }
 
-/* Terms of one particle against one wall or body, summed over its samples b of volume psi_b: g = sum psi_b grad W_ib,
- * t = sum psi_b (x_b - c) x grad W_ib with c the object's centre (origin for walls). They replace the samples in every iteration. */
+/* Terms of one particle against one wall or body, summed over its samples b of volume psi_b: g = sum psi_b
+ * grad W_ib, t = sum psi_b (x_b - c) x grad W_ib with c the object's centre (origin for walls). They replace
+ * the samples in every iteration. */
 typedef struct Contact {
     uint32_t particle;
     uint32_t object;
-    float g[3]; /* 1/m */
-    float t[3]; /* 1 */
+    float g[3];   /* 1/m */
+    float t[3];   /* 1 */
     float weight; /* sum psi_b W_ib */
 } Contact;
 
@@ -85,15 +87,15 @@ typedef struct Scratch {
 typedef struct PairData {
     uint32_t count;
     Kernel kernel;
-    float volume;         /* V, m^3 */
-    float gradient_unit;  /* value of 1 in RowEntry.gradient, 1/m */
+    float volume;        /* V, m^3 */
+    float gradient_unit; /* value of 1 in RowEntry.gradient, 1/m */
     bool wide;
     const uint8_t *entries;      /* RowEntry or RowEntryWide */
     const uint32_t *slice_start; /* first entry of a slice */
     const uint16_t *slice_length;
     const Float4 *position;
-    const float *density;        /* rho / rho0 */
-    const Float4 *gradient_sum;  /* G_i = sum_j V grad W_ij + g_i; [3]: diagonal of D D^T */
+    const float *density;       /* rho / rho0 */
+    const Float4 *gradient_sum; /* G_i = sum_j V grad W_ij + g_i; [3]: diagonal of D D^T */
 } PairData;
 
 typedef enum SearchStatus {
@@ -104,7 +106,8 @@ typedef enum SearchStatus {
     SEARCH_TOO_MANY_OBJECTS = 8
 } SearchStatus;
 
-/* Takes room for `entries` row entries; returns the first or UINT32_MAX when the pool is used up. Called by several threads. */
+/* Takes room for `entries` row entries; returns the first or UINT32_MAX when the pool is used up. Called by
+ * several threads. */
 typedef uint32_t RowAllocate(void *rows, int thread, uint32_t entries);
 
 typedef struct SearchJob {
@@ -147,13 +150,16 @@ typedef struct ForceJob {
 
 typedef struct Passes {
     const char *name;
-    /* Neighbours of a block's particles: rows, density, gradient sums. Returns SearchStatus bits; on too dense, *fault is the particle. */
+    /* Neighbours of a block's particles: rows, density, gradient sums. Returns SearchStatus bits; on too
+     * dense, *fault is the particle. */
     int (*search)(const SearchJob *job, uint32_t block, int thread, Scratch *scratch, uint32_t *fault);
-    /* Boundary terms of a block's particles; contacts go to scratch->contacts. Returns how many, or -1 with *fault. */
+    /* Boundary terms of a block's particles; contacts go to scratch->contacts. Returns how many, or -1 with
+     * *fault. */
     int (*boundary)(const BoundaryJob *job, uint32_t block, Scratch *scratch, uint32_t *fault);
     /* result_i = (D^T p)_i = p_i G_i + sum_j p_j V grad W_ij */
     void (*accelerate)(const PairData *pairs, const float *p, Float4 *result, uint32_t block);
-    /* result_i = (D v)_i = v_i . G_i - sum_j v_j . V grad W_ij; contacts with moving bodies are the caller's */
+    /* result_i = (D v)_i = v_i . G_i - sum_j v_j . V grad W_ij; contacts with moving bodies are the caller's
+     */
     void (*divergence)(const PairData *pairs, const Float4 *v, float *result, uint32_t block);
     /* gravity, and XSPH viscosity that conserves momentum exactly */
     void (*forces)(const ForceJob *job, uint32_t block);

@@ -1,7 +1,9 @@
-/* Instruments: wave gauges, pressure sensors, forces on objects and parts of them. They read the last step; nothing here changes the state.
+/* Instruments: wave gauges, pressure sensors, forces on objects and parts of them. They read the last step;
+ * nothing here changes the state.
  *
- * A pressure is the force on the boundary samples of a small patch divided by its area. That is the pressure the fluid really
- * exerts (momentum balance), without the bias that averaging over particles on one side of a wall has. */
+ * A pressure is the force on the boundary samples of a small patch divided by its area. That is the pressure
+ * the fluid really exerts (momentum balance), without the bias that averaging over particles on one side of a
+ * wall has. */
 #include "sim.h"
 
 #include <math.h>
@@ -16,7 +18,8 @@ static char *copy_text(const char *text) {
     return copy ? memcpy(copy, text, length) : NULL;
 }
 
-static bool probe_object(const SkiffSim *sim, const SkiffProbeDef *def, const char *path, int32_t *object, Err *err) {
+static bool probe_object(const SkiffSim *sim, const SkiffProbeDef *def, const char *path, int32_t *object,
+                         Err *err) {
     *object = -1;
     if (def->object == NULL) {
         if (def->kind == SKIFF_PROBE_FORCE)
@@ -34,7 +37,8 @@ static bool probe_object(const SkiffSim *sim, const SkiffProbeDef *def, const ch
 }
 
 /* World position at the start and normal of a sample. */
-static void sample_place(const SkiffSim *sim, const BoundarySet *set, bool moving, uint32_t s, double position[3]) {
+static void sample_place(const SkiffSim *sim, const BoundarySet *set, bool moving, uint32_t s,
+                         double position[3]) {
     for (int k = 0; k < 3; k++)
         position[k] = (double)set->samples.position[s][k] +
                       (moving ? sim->bodies[set->samples.object[s] - 1].position[k] : sim->origin[k]);
@@ -48,7 +52,8 @@ static double distance_sq(const double a[3], const float b[3]) {
 }
 
 /* Normal of the sample nearest to the sensor, which tells the face it sits on. */
-static bool pressure_face(const SkiffSim *sim, const Probe *probe, double radius, float normal[3], bool *into) {
+static bool pressure_face(const SkiffSim *sim, const Probe *probe, double radius, float normal[3],
+                          bool *into) {
     double best = radius * radius;
     bool found = false;
     for (int m = 0; m < 2; m++) {
@@ -62,7 +67,8 @@ static bool pressure_face(const SkiffSim *sim, const Probe *probe, double radius
             best = d;
             found = true;
             memcpy(normal, set->samples.normal[s], 3 * sizeof(float));
-            *into = set->samples.object[s] == 0; /* a tank's mesh faces away from the fluid, a body's towards it */
+            *into = set->samples.object[s] ==
+                    0; /* a tank's mesh faces away from the fluid, a body's towards it */
         }
     }
     return found;
@@ -99,7 +105,8 @@ static bool probe_choose(const SkiffSim *sim, Probe *probe, const char *path, Er
             probe->area += use ? (double)set->samples.area[s] : 0.0;
         }
     }
-    return probe->area > 0.0 || err_add(err, ERR_INPUT, "%s: no part of '%s' is in [min, max]", path, def->object);
+    return probe->area > 0.0 ||
+           err_add(err, ERR_INPUT, "%s: no part of '%s' is in [min, max]", path, def->object);
 }
 
 static bool probe_make(SkiffSim *sim, const SkiffProbeDef *def, const char *path, Probe *probe, Err *err) {
@@ -124,7 +131,8 @@ static bool probe_make(SkiffSim *sim, const SkiffProbeDef *def, const char *path
         return false;
     if (def->object != NULL)
         probe->def.object = probe->object == 0 ? "tank" : sim->bodies[probe->object - 1].name;
-    const bool patch = def->kind == SKIFF_PROBE_PRESSURE || (def->kind == SKIFF_PROBE_FORCE && def->has_region);
+    const bool patch =
+        def->kind == SKIFF_PROBE_PRESSURE || (def->kind == SKIFF_PROBE_FORCE && def->has_region);
     return !patch || probe_choose(sim, probe, path, err);
 }
 
@@ -138,7 +146,8 @@ bool probes_make(SkiffSim *sim, const SkiffDef *def, Err *err) {
         char path[64];
         snprintf(path, sizeof path, "Probes[%d]", k);
         for (int other = 0; other < k; other++)
-            if (def->probes[k].name && def->probes[other].name && !strcmp(def->probes[k].name, def->probes[other].name))
+            if (def->probes[k].name && def->probes[other].name &&
+                !strcmp(def->probes[k].name, def->probes[other].name))
                 good = err_add(err, ERR_INPUT, "%s.name: '%s' is also the name of Probes[%d]", path,
                                def->probes[k].name, other);
         good &= probe_make(sim, &def->probes[k], path, &sim->probes[k], err);
@@ -162,7 +171,7 @@ void probes_free(SkiffSim *sim) {
 enum { GAUGE_POINTS = 4096 };
 
 typedef struct Gauge {
-    double x, z;  /* window-local */
+    double x, z; /* window-local */
     double low, step;
     int count;
     double fluid[GAUGE_POINTS], wall[GAUGE_POINTS]; /* volume fraction of each along the line */
@@ -183,7 +192,8 @@ static void gauge_add(Gauge *gauge, const Kernel *kernel, const float *p, double
     }
 }
 
-/* Wet where the fluid fills more than half of what walls leave; the ends of wet stretches are interpolated. */
+/* Wet where the fluid fills more than half of what walls leave; the ends of wet stretches are interpolated.
+ */
 static double gauge_wet_length(const Gauge *gauge) {
     double wet = 0.0;
     for (int k = 0; k + 1 < gauge->count; k++) {
@@ -252,9 +262,11 @@ static void part_force(const SkiffSim *sim, const BoundarySet *set, const uint8_
             const double at[3] = {set->sorted.x[s], set->sorted.y[s], set->sorted.z[s]};
             const double d[3] = {(double)p[0] - at[0], (double)p[1] - at[1], (double)p[2] - at[2]};
             const double r = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-            const double factor = weight * (double)set->sorted.volume[s] * kernel_gradient_factor(&sim->kernel, r);
+            const double factor =
+                weight * (double)set->sorted.volume[s] * kernel_gradient_factor(&sim->kernel, r);
             const double f[3] = {factor * d[0], factor * d[1], factor * d[2]};
-            const double arm[3] = {at[0] - (double)centre[0], at[1] - (double)centre[1], at[2] - (double)centre[2]};
+            const double arm[3] = {at[0] - (double)centre[0], at[1] - (double)centre[1],
+                                   at[2] - (double)centre[2]};
             double t[3];
             cross_product(arm, f, t);
             for (int k = 0; k < 3; k++) {
@@ -305,7 +317,8 @@ void skiff_probe_read(const SkiffSim *sim, double *values) {
             read_part_force(sim, probe, force);
             double normal[3] = {probe->normal[0], probe->normal[1], probe->normal[2]};
             if (probe->object > 0)
-                matrix_times((const double(*)[3])sim->bodies[probe->object - 1].matrix, probe->normal, normal);
+                matrix_times((const double(*)[3])sim->bodies[probe->object - 1].matrix, probe->normal,
+                             normal);
             values[0] = (force[0] * normal[0] + force[1] * normal[1] + force[2] * normal[2]) / probe->area;
             break;
         }

@@ -33,7 +33,8 @@ static bool rows_reserve(Rows *rows, const Particles *particles, int threads, Er
     const size_t padded = particles->capacity + SLICE, slices = particles->capacity / SLICE + 1;
     if (rows->pool_entries == 0) /* 45 places a particle: 39 are needed in water at rest */
         rows->pool_entries = (uint32_t)(slices * 45) + CHUNK_ENTRIES * (uint32_t)threads;
-    return buffer_reserve(&rows->pool, "neighbour rows", rows->pool_entries * rows_entry_size(rows->wide), err) &&
+    return buffer_reserve(&rows->pool, "neighbour rows", rows->pool_entries * rows_entry_size(rows->wide),
+                          err) &&
            buffer_reserve(&rows->slice_start, "row starts", slices * sizeof(uint32_t), err) &&
            buffer_reserve(&rows->slice_length, "row lengths", slices * sizeof(uint16_t), err) &&
            buffer_reserve(&rows->density, "density", padded * sizeof(float), err) &&
@@ -63,8 +64,8 @@ static int rows_search(Rows *rows, const Passes *passes, const SearchJob *job, i
     return status;
 }
 
-bool rows_build(Rows *rows, const Passes *passes, const Grid *grid, const Particles *particles, const Kernel *kernel,
-                float volume, int threads, Err *err) {
+bool rows_build(Rows *rows, const Passes *passes, const Grid *grid, const Particles *particles,
+                const Kernel *kernel, float volume, int threads, Err *err) {
     for (;;) {
         if (!rows_reserve(rows, particles, threads, err))
             return false;
@@ -87,10 +88,11 @@ bool rows_build(Rows *rows, const Passes *passes, const Grid *grid, const Partic
         uint32_t fault;
         const int status = rows_search(rows, passes, &job, threads, &fault);
         if (status & SEARCH_TOO_DENSE)
-            return err_set(err, ERR_DIVERGED,
-                           "particle %llu has more than %d neighbours, or more than %d particles in the cells "
-                           "around it; water at rest has 34",
-                           (unsigned long long)particles->id[fault], MAX_NEIGHBOURS, MAX_CANDIDATES);
+            return err_set(
+                err, ERR_DIVERGED,
+                "particle %llu has more than %d neighbours, or more than %d particles in the cells "
+                "around it; water at rest has 34",
+                (unsigned long long)particles->id[fault], MAX_NEIGHBOURS, MAX_CANDIDATES);
         if (status & SEARCH_NEEDS_MEMORY)
             rows->pool_entries += rows->pool_entries / 2;
         if (status & SEARCH_NEEDS_WIDE)

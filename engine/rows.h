@@ -25,10 +25,11 @@ typedef struct Rows {
     Buffer scratch; /* Scratch of every thread */
 } Rows;
 
-/* Neighbours, densities (fluid part) and gradient sums (fluid part, fixed-point units) of the sorted particles. Grows the pool when it is too
- * small, and turns to wide entries when offsets do not fit: both happen in the first steps or never. */
-bool rows_build(Rows *rows, const Passes *passes, const Grid *grid, const Particles *particles, const Kernel *kernel,
-                float volume, int threads, Err *err);
+/* Neighbours, densities (fluid part) and gradient sums (fluid part, fixed-point units) of the sorted
+ * particles. Grows the pool when it is too small, and turns to wide entries when offsets do not fit: both
+ * happen in the first steps or never. */
+bool rows_build(Rows *rows, const Passes *passes, const Grid *grid, const Particles *particles,
+                const Kernel *kernel, float volume, int threads, Err *err);
 void rows_free(Rows *rows);
 Scratch *rows_scratch(Rows *rows, int thread);
 size_t rows_entry_size(bool wide);

@@ -11,7 +11,8 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
-/* Bytes a particle needs in all arrays together; rows are most of it. Measured by skiff_memory, see tests/bench/NOTES.md. */
+/* Bytes a particle needs in all arrays together; rows are most of it. Measured by skiff_memory, see
+ * tests/bench/NOTES.md. */
 enum { BYTES_PER_PARTICLE = 800 };
 
 /* ---- Machine ---- */
@@ -78,15 +79,19 @@ static bool check_blocks(const SkiffDef *def, double *particles, Err *err) {
         const SkiffBlockDef *block = &def->blocks[b];
         bool finite = true;
         for (int k = 0; k < 3; k++) {
-            finite = finite && isfinite(block->start[k]) && isfinite(block->end[k]) && isfinite(block->velocity[k]);
+            finite = finite && isfinite(block->start[k]) && isfinite(block->end[k]) &&
+                     isfinite(block->velocity[k]);
             if (!(block->end[k] > block->start[k]))
-                good = err_add(err, ERR_INPUT, "FluidBlocks[%d]: end[%d] = %g m must be above start[%d] = %g m", b, k,
-                               (double)block->end[k], k, (double)block->start[k]);
+                good =
+                    err_add(err, ERR_INPUT, "FluidBlocks[%d]: end[%d] = %g m must be above start[%d] = %g m",
+                            b, k, (double)block->end[k], k, (double)block->start[k]);
         }
         if (!finite || isnan(block->time))
-            good = err_add(err, ERR_INPUT, "FluidBlocks[%d]: start, end, velocity and time must be finite", b);
+            good =
+                err_add(err, ERR_INPUT, "FluidBlocks[%d]: start, end, velocity and time must be finite", b);
         if (block->repeat < 1)
-            good = err_add(err, ERR_INPUT, "FluidBlocks[%d].repeat: %d, must be at least 1", b, block->repeat);
+            good =
+                err_add(err, ERR_INPUT, "FluidBlocks[%d].repeat: %d, must be at least 1", b, block->repeat);
         if (block->repeat > 1 && !(block->period > 0.0 && isfinite(block->period)))
             good = err_add(err, ERR_INPUT, "FluidBlocks[%d].period: %g s, must be above 0", b, block->period);
         double counts[3];
@@ -100,14 +105,16 @@ static bool check_memory(double particles, Err *err) {
     const double need = particles * BYTES_PER_PARTICLE, have = (double)memory_available();
     if (particles > 2e9 || need > have)
         return err_add(err, ERR_INPUT,
-                       "FluidBlocks: %.4g particles need about %.3g GB, this machine has %.3g GB free (and 2e9 is the limit)",
+                       "FluidBlocks: %.4g particles need about %.3g GB, this machine has %.3g GB free (and "
+                       "2e9 is the limit)",
                        particles, need * 1e-9, have * 1e-9);
     return true;
 }
 
 /* ---- Parts ---- */
 
-/* Whole metres near the middle of things: float coordinates stay small, and a scene around the origin keeps its numbers. */
+/* Whole metres near the middle of things: float coordinates stay small, and a scene around the origin keeps
+ * its numbers. */
 static void choose_origin(SkiffSim *sim, const SkiffDef *def) {
     double min[3] = {INFINITY, INFINITY, INFINITY}, max[3] = {-INFINITY, -INFINITY, -INFINITY};
     for (int b = 0; b < def->block_count; b++)
@@ -159,7 +166,8 @@ static bool make_body(SkiffSim *sim, const SkiffDef *def, int index, Err *err) {
         return false;
     for (int other = 0; other < index; other++)
         if (sim->bodies[other].name && strcmp(body->name, sim->bodies[other].name) == 0)
-            return err_add(err, ERR_INPUT, "%s.name: '%s' is also the name of RigidBodies[%d]", path, body->name, other);
+            return err_add(err, ERR_INPUT, "%s.name: '%s' is also the name of RigidBodies[%d]", path,
+                           body->name, other);
     BoundarySet own = {0};
     const float spacing = def->params.boundary_spacing * def->params.particle_radius;
     Mesh placed = body->mesh;
@@ -176,21 +184,36 @@ static bool make_body(SkiffSim *sim, const SkiffDef *def, int index, Err *err) {
 
 /* ---- Overlaps ---- */
 
-/* Deepest point of body a's surface inside body b, m. */
+/* How deep a point of body a (its frame, m) lies inside body b, at most as deep as inside a itself; `shift`
+ * leads from a's frame to b's. */
+static double depth_in(const Body *a, const Body *b, const double shift[3], const float p[3], bool surface) {
+    const float q[3] = {(float)((double)p[0] + shift[0]), (float)((double)p[1] + shift[1]),
+                        (float)((double)p[2] + shift[2])};
+    for (int k = 0; k < 3; k++)
+        if (q[k] < b->mesh.min[k] || q[k] > b->mesh.max[k])
+            return 0.0;
+    const double in_b = -(double)mesh_distance(&b->mesh, q, NULL);
+    return surface ? in_b : fmin(in_b, -(double)mesh_distance(&a->mesh, p, NULL));
+}
+
+/* Depth of the overlap as body a's surface and the points halfway to its centre see it: the latter find
+ * bodies that coincide. */
 static double penetration(const Body *a, const Body *b) {
+    const double shift[3] = {a->position[0] - b->position[0], a->position[1] - b->position[1],
+                             a->position[2] - b->position[2]};
     double deepest = 0.0;
     for (uint32_t t = 0; t < a->mesh.triangle_count; t++) {
         const uint32_t *corner = a->mesh.triangles[t];
-        double points[4][3] = {{0}};
-        for (int c = 0; c < 3; c++)
-            for (int k = 0; k < 3; k++) {
-                points[c][k] = (double)a->mesh.vertices[corner[c]][k] + a->position[k] - b->position[k];
-                points[3][k] += points[c][k] / 3.0;
-            }
-        for (int c = 0; c < 4; c++) {
-            const float p[3] = {(float)points[c][0], (float)points[c][1], (float)points[c][2]};
-            deepest = fmax(deepest, -(double)mesh_distance(&b->mesh, p, NULL));
+        float middle[3] = {0}, inner[3];
+        for (int c = 0; c < 3; c++) {
+            deepest = fmax(deepest, depth_in(a, b, shift, a->mesh.vertices[corner[c]], true));
+            for (int k = 0; k < 3; k++)
+                middle[k] += a->mesh.vertices[corner[c]][k] / 3.0f;
         }
+        for (int k = 0; k < 3; k++)
+            inner[k] = 0.5f * middle[k];
+        deepest = fmax(deepest, depth_in(a, b, shift, middle, true));
+        deepest = fmax(deepest, depth_in(a, b, shift, inner, false));
     }
     return deepest;
 }
@@ -203,8 +226,9 @@ static bool check_overlaps(const SkiffSim *sim, Err *err) {
             const double depth = fmax(penetration(&sim->bodies[a], &sim->bodies[b]),
                                       penetration(&sim->bodies[b], &sim->bodies[a]));
             if (depth > tolerance)
-                good = err_add(err, ERR_INPUT, "RigidBodies[%d]: overlaps RigidBodies[%d] by %.3g m (allowed: %.3g m)", a,
-                               b, depth, tolerance);
+                good = err_add(err, ERR_INPUT,
+                               "RigidBodies[%d]: overlaps RigidBodies[%d] by %.3g m (allowed: %.3g m)", a, b,
+                               depth, tolerance);
         }
         if (sim->tank.triangle_count == 0)
             continue;
@@ -219,7 +243,8 @@ static bool check_overlaps(const SkiffSim *sim, Err *err) {
             worst = fmax(worst, (double)mesh_distance(&sim->tank, p, NULL));
         }
         if (worst > tolerance)
-            good = err_add(err, ERR_INPUT, "RigidBodies[%d]: reaches %.3g m through the tank's wall (allowed: %.3g m)", a,
+            good = err_add(err, ERR_INPUT,
+                           "RigidBodies[%d]: reaches %.3g m through the tank's wall (allowed: %.3g m)", a,
                            worst, tolerance);
     }
     return good;
@@ -241,7 +266,8 @@ static bool choose_domain(SkiffSim *sim, const SkiffDef *def, Err *err) {
             domain->min[k] = (float)((double)def->domain_min[k] - sim->origin[k]);
             domain->max[k] = (float)((double)def->domain_max[k] - sim->origin[k]);
             if (!(domain->max[k] > domain->min[k]) || !isfinite(domain->min[k]) || !isfinite(domain->max[k]))
-                good = err_add(err, ERR_INPUT, "Configuration.domainMax[%d]: %g m must be finite and above domainMin[%d]", k,
+                good = err_add(err, ERR_INPUT,
+                               "Configuration.domainMax[%d]: %g m must be finite and above domainMin[%d]", k,
                                (double)def->domain_max[k], k);
         }
         return good;
@@ -300,8 +326,8 @@ static bool reserve_step_memory(SkiffSim *sim, uint32_t capacity, Err *err) {
            boundary_reserve(&sim->boundary, capacity, sim->body_count, err) &&
            dfsph_reserve(&sim->dfsph, capacity, 1 + (uint32_t)sim->body_count, err) &&
            buffer_reserve(&sim->total_pressure, "total pressure", padded * sizeof(float), err) &&
-           buffer_reserve(&sim->object_forces, "object forces", (1 + (size_t)sim->body_count) * 6 * sizeof(double),
-                          err) &&
+           buffer_reserve(&sim->object_forces, "object forces",
+                          (1 + (size_t)sim->body_count) * 6 * sizeof(double), err) &&
            buffer_reserve(&sim->sums, "statistics", (padded / BLOCK + 1) * 128, err);
 }
 
@@ -331,8 +357,8 @@ static bool build(SkiffSim *sim, const SkiffDef *def, Err *err) {
     good = good && check_overlaps(sim, err) && choose_domain(sim, def, err) &&
            boundary_weigh(&sim->boundary.fixed, &sim->kernel, err) &&
            reserve_step_memory(sim, (uint32_t)particles, err) &&
-           boundary_place(&sim->boundary, sim->bodies, sim->body_count, sim->origin, sim->kernel.support, sim->threads,
-                          err) &&
+           boundary_place(&sim->boundary, sim->bodies, sim->body_count, sim->origin, sim->kernel.support,
+                          sim->threads, err) &&
            block_emit(sim, &sim->stats.emitted, err) && probes_make(sim, def, err);
     if (!good)
         return false;

@@ -10,11 +10,12 @@ typedef struct EmitBlock {
 } EmitBlock;
 
 typedef struct Probe {
-    SkiffProbeDef def; /* name and object are owned copies */
-    int32_t object;    /* -1: any */
-    uint8_t *chosen[2];   /* pressure, or force on a region: 1 for the samples that count, of the fixed and the moving set */
-    double area;          /* m^2 of the chosen samples */
-    double normal[3];     /* pressure: unit, from the fluid into the wall; body axes when the samples move */
+    SkiffProbeDef def;  /* name and object are owned copies */
+    int32_t object;     /* -1: any */
+    uint8_t *chosen[2]; /* pressure, or force on a region: 1 for the samples that count, of the fixed and the
+                           moving set */
+    double area;        /* m^2 of the chosen samples */
+    double normal[3];   /* pressure: unit, from the fluid into the wall; body axes when the samples move */
     char (*channels)[96];
     int channel_count;
 } Probe;
@@ -23,16 +24,16 @@ struct SkiffSim {
     /* set at creation */
     SkiffParams params;
     Kernel kernel;
-    float volume;           /* m^3, of a particle */
-    double origin[3];       /* of the window, world, m */
-    GridBounds domain;      /* window-local */
+    float volume;      /* m^3, of a particle */
+    double origin[3];  /* of the window, world, m */
+    GridBounds domain; /* window-local */
     int threads;
     SkiffSimd simd;
     const Passes *passes;
-    uint64_t def_hash;      /* of everything a state must agree with */
+    uint64_t def_hash; /* of everything a state must agree with */
     EmitBlock *blocks;
     int block_count;
-    Mesh tank;              /* window-local; no triangles: no tank */
+    Mesh tank; /* window-local; no triangles: no tank */
     bool tank_open;
     Body *bodies;
     int body_count;
@@ -52,17 +53,20 @@ struct SkiffSim {
 
     /* solves */
     Dfsph dfsph;
-    Buffer total_pressure;  /* [particles] sum of both pressures, m^2, of the last step */
-    Buffer object_forces;   /* [objects][6] force (N) and torque about the object's centre (N m) of the last step */
+    Buffer total_pressure; /* [particles] sum of both pressures, m^2, of the last step */
+    Buffer object_forces;  /* [objects][6] force (N) and torque about the object's centre (N m) of the last
+                              step */
 
     /* advance */
-    Buffer sums;            /* [blocks] partial sums of the statistics */
+    Buffer sums; /* [blocks] partial sums of the statistics */
     SkiffStats stats;
 };
 
-/* Emits the blocks whose time has come. Lattice points inside bodies, outside the tank or on existing water are refused: see block.c. */
+/* Emits the blocks whose time has come. Lattice points inside bodies, outside the tank or on existing water
+ * are refused: see block.c. */
 bool block_emit(SkiffSim *sim, uint32_t *emitted, Err *err);
-/* Particles of one emission; also without a simulation's capacity (counts are exact, double to survive absurd input). */
+/* Particles of one emission; also without a simulation's capacity (counts are exact, double to survive absurd
+ * input). */
 double block_particles(const SkiffBlockDef *def, float spacing, double counts[3]);
 
 bool probes_make(SkiffSim *sim, const SkiffDef *def, Err *err);

@@ -1,8 +1,10 @@
-/* Skiff: particle water (SPH) around moving bodies. The engine's public interface: no GL, no stdout, no files but states.
+/* Skiff: particle water (SPH) around moving bodies. The engine's public interface: no GL, no stdout, no files
+ * but states.
  *
- * Units are SI, y is up. Arrays are owned by the simulation and valid until the next call that changes it. Functions that can fail
- * take an `Err *` last, return false or NULL, and leave their object as it was unless they say otherwise. One simulation is used by one thread
- * at a time; it runs its own OpenMP threads inside a call. Results do not depend on their number, bit for bit.
+ * Units are SI, y is up. Arrays are owned by the simulation and valid until the next call that changes it.
+ * Functions that can fail take an `Err *` last, return false or NULL, and leave their object as it was unless
+ * they say otherwise. One simulation is used by one thread at a time; it runs its own OpenMP threads inside a
+ * call. Results do not depend on their number, bit for bit.
  *
  *   SkiffDef def = skiff_def_default();
  *   ... fill in ...
@@ -25,11 +27,11 @@ extern "C" {
 /* ---- Settings (params.inl is the one list of them) ---- */
 
 typedef struct SkiffParams {
-#define PARAM_FLOAT(field, key, value, min, max, unit, help) float field;
-#define PARAM_INT(field, key, value, min, max, unit, help) int field;
-#define PARAM_BOOL(field, key, value, help) bool field;
+#define PARAM_FLOAT(field, key, value, min, max, unit, help)  float field;
+#define PARAM_INT(field, key, value, min, max, unit, help)    int field;
+#define PARAM_BOOL(field, key, value, help)                   bool field;
 #define PARAM_VEC3(field, key, x, y, z, min, max, unit, help) float field[3];
-#define PARAM_ENUM(field, key, value, names, help) int field;
+#define PARAM_ENUM(field, key, value, names, help)            int field;
 #include "params.inl"
 #undef PARAM_FLOAT
 #undef PARAM_INT
@@ -41,13 +43,13 @@ typedef struct SkiffParams {
 typedef enum SkiffParamType { SKIFF_FLOAT, SKIFF_INT, SKIFF_BOOL, SKIFF_VEC3, SKIFF_ENUM } SkiffParamType;
 
 typedef struct SkiffParamInfo {
-    const char *key;      /* JSON key */
+    const char *key; /* JSON key */
     SkiffParamType type;
-    uint32_t offset;      /* of the field in SkiffParams */
-    double defaults[3];   /* [0] for scalars; enums: index */
-    double min, max;      /* inclusive; per component for vectors */
-    const char *unit;     /* "" where there is none */
-    const char *names;    /* enums: "a|b|c"; else NULL */
+    uint32_t offset;    /* of the field in SkiffParams */
+    double defaults[3]; /* [0] for scalars; enums: index */
+    double min, max;    /* inclusive; per component for vectors */
+    const char *unit;   /* "" where there is none */
+    const char *names;  /* enums: "a|b|c"; else NULL */
     const char *help;
 } SkiffParamInfo;
 
@@ -57,15 +59,21 @@ bool skiff_params_check(const SkiffParams *params, Err *err);
 
 /* ---- What a simulation is made of. Strings and arrays are borrowed during skiff_create only. ---- */
 
-typedef enum SkiffGeometryKind { SKIFF_GEOMETRY_NONE, SKIFF_GEOMETRY_MESH, SKIFF_GEOMETRY_BOX, SKIFF_GEOMETRY_SPHERE, SKIFF_GEOMETRY_PLANES } SkiffGeometryKind;
+typedef enum SkiffGeometryKind {
+    SKIFF_GEOMETRY_NONE,
+    SKIFF_GEOMETRY_MESH,
+    SKIFF_GEOMETRY_BOX,
+    SKIFF_GEOMETRY_SPHERE,
+    SKIFF_GEOMETRY_PLANES
+} SkiffGeometryKind;
 
 /* Own frame -> world: scale, rotate about `rotation_axis` by `rotation_angle` (rad), translate. */
 typedef struct SkiffGeometryDef {
     SkiffGeometryKind kind;
-    const char *file;                 /* mesh: OBJ file, closed */
-    float size[3];                    /* box: edge lengths, centred on the origin, m */
-    float radius;                     /* sphere, centred on the origin, m */
-    const float (*plane_points)[3];   /* planes: convex region (p - point) . normal <= 0; normals point out */
+    const char *file;               /* mesh: OBJ file, closed */
+    float size[3];                  /* box: edge lengths, centred on the origin, m */
+    float radius;                   /* sphere, centred on the origin, m */
+    const float (*plane_points)[3]; /* planes: convex region (p - point) . normal <= 0; normals point out */
     const float (*plane_normals)[3];
     int plane_count;
     float scale[3];
@@ -81,7 +89,8 @@ typedef struct SkiffTankDef {
     float wet_height;          /* only walls below this y are sampled, m; INFINITY: all */
 } SkiffTankDef;
 
-/* An axis-aligned block on a cubic lattice of spacing d: round((end - start) / d) particles along each axis, at least one. */
+/* An axis-aligned block on a cubic lattice of spacing d: round((end - start) / d) particles along each axis,
+ * at least one. */
 typedef struct SkiffBlockDef {
     float start[3], end[3]; /* m */
     float velocity[3];      /* m/s */
@@ -91,33 +100,43 @@ typedef struct SkiffBlockDef {
 } SkiffBlockDef;
 
 /* Bits of SkiffBodyDef.free_axes: translation along and rotation about the world's axes. */
-enum { SKIFF_FREE_X = 1, SKIFF_FREE_Y = 2, SKIFF_FREE_Z = 4, SKIFF_FREE_RX = 8, SKIFF_FREE_RY = 16, SKIFF_FREE_RZ = 32, SKIFF_FREE_ALL = 63 };
+enum {
+    SKIFF_FREE_X = 1,
+    SKIFF_FREE_Y = 2,
+    SKIFF_FREE_Z = 4,
+    SKIFF_FREE_RX = 8,
+    SKIFF_FREE_RY = 16,
+    SKIFF_FREE_RZ = 32,
+    SKIFF_FREE_ALL = 63
+};
 
 /* A rigid body. An axis that is not free keeps the initial velocity (0: it is held). */
 typedef struct SkiffBodyDef {
-    const char *name;           /* unique, not empty */
+    const char *name; /* unique, not empty */
     SkiffGeometryDef geometry;
-    float density;              /* kg/m^3, of the uniform solid; used when mass is 0 */
-    float mass;                 /* kg, or 0 */
-    float velocity[3];          /* of the centre of mass, m/s */
-    float angular_velocity[3];  /* rad/s, world axes */
-    uint32_t free_axes;         /* 0: static or prescribed */
-    double release_time;        /* s; until then the body is held still in every axis that is free afterwards */
+    float density;             /* kg/m^3, of the uniform solid; used when mass is 0 */
+    float mass;                /* kg, or 0 */
+    float velocity[3];         /* of the centre of mass, m/s */
+    float angular_velocity[3]; /* rad/s, world axes */
+    uint32_t free_axes;        /* 0: static or prescribed */
+    double release_time; /* s; until then the body is held still in every axis that is free afterwards */
 } SkiffBodyDef;
 
 typedef enum SkiffProbeKind {
-    SKIFF_PROBE_HEIGHT,   /* length of the vertical line at (x, z) that is under water, m: what a wave gauge reads */
+    SKIFF_PROBE_HEIGHT,   /* length of the vertical line at (x, z) that is under water, m: what a wave gauge
+                             reads */
     SKIFF_PROBE_PRESSURE, /* mean pressure on the boundary samples within `radius` of a point, Pa */
-    SKIFF_PROBE_FORCE     /* force (N) and torque about the body's centre or the world origin (N m) of the fluid on an object */
+    SKIFF_PROBE_FORCE /* force (N) and torque about the body's centre or the world origin (N m) of the fluid
+                         on an object */
 } SkiffProbeKind;
 
 typedef struct SkiffProbeDef {
-    const char *name;        /* unique, not empty */
+    const char *name; /* unique, not empty */
     SkiffProbeKind kind;
-    float point[3];          /* m; height: y is ignored */
-    float radius;            /* m; pressure: 0 means the support radius */
-    const char *object;      /* force: a body's name, or "tank"; pressure: NULL (any) or a name */
-    bool has_region;         /* force: only samples inside [min, max], in the world at the start */
+    float point[3];     /* m; height: y is ignored */
+    float radius;       /* m; pressure: 0 means the support radius */
+    const char *object; /* force: a body's name, or "tank"; pressure: NULL (any) or a name */
+    bool has_region;    /* force: only samples inside [min, max], in the world at the start */
     float min[3], max[3];
 } SkiffProbeDef;
 
@@ -132,10 +151,10 @@ typedef struct SkiffDef {
     int body_count;
     const SkiffProbeDef *probes;
     int probe_count;
-    double start_time;                 /* s */
-    bool has_domain;                   /* false: bounds of everything, grown */
+    double start_time; /* s */
+    bool has_domain;   /* false: bounds of everything, grown */
     float domain_min[3], domain_max[3];
-    int threads;                       /* 0: the number of physical cores this process may use */
+    int threads; /* 0: the number of physical cores this process may use */
     SkiffSimd simd;
 } SkiffDef;
 
@@ -149,24 +168,27 @@ SkiffProbeDef skiff_probe_default(void);
 
 typedef struct SkiffSim SkiffSim;
 
-/* Checks everything, then builds. NULL with ERR_INPUT: every problem found, one a line, each beginning with the scene's path of it
+/* Checks everything, then builds. NULL with ERR_INPUT: every problem found, one a line, each beginning with
+ * the scene's path of it
  * ("FluidBlocks[2]: ..."). */
 SkiffSim *skiff_create(const SkiffDef *def, Err *err);
 void skiff_destroy(SkiffSim *sim);
 
-/* One step of params.time_step. ERR_DIVERGED (step, particle, value in the message): the state is the one in which the fault was found. */
+/* One step of params.time_step. ERR_DIVERGED (step, particle, value in the message): the state is the one in
+ * which the fault was found. */
 bool skiff_step(SkiffSim *sim, Err *err);
 
 /* ---- Looking ---- */
 
-double skiff_time(const SkiffSim *sim);      /* s */
+double skiff_time(const SkiffSim *sim); /* s */
 uint64_t skiff_step_count(const SkiffSim *sim);
 const SkiffParams *skiff_params(const SkiffSim *sim);
-SkiffSimd skiff_simd(const SkiffSim *sim);   /* the one in use, never AUTO */
+SkiffSimd skiff_simd(const SkiffSim *sim); /* the one in use, never AUTO */
 const char *skiff_simd_name(SkiffSimd simd);
 int skiff_threads(const SkiffSim *sim);
 
-/* Fluid particles, in an order that changes from step to step; `id` tells who is who. Positions are window-local: add `origin`. */
+/* Fluid particles, in an order that changes from step to step; `id` tells who is who. Positions are
+ * window-local: add `origin`. */
 typedef struct SkiffParticles {
     uint32_t count;
     double origin[3];
@@ -193,7 +215,8 @@ typedef struct SkiffBody {
     double mass;                /* kg */
     double inertia[3][3];       /* kg m^2, about the centre of mass, body axes */
     double position[3];         /* of the centre of mass, world, m */
-    double rotation[4];         /* unit quaternion x y z w; identity at the start, whatever the geometry's own rotation */
+    double rotation[4];         /* unit quaternion x y z w; identity at the start, whatever the geometry's own
+                                   rotation */
     double velocity[3];         /* m/s */
     double angular_velocity[3]; /* rad/s, world axes */
     double force[3];            /* of the fluid, mean over the last step, N */
@@ -204,7 +227,8 @@ int skiff_body_count(const SkiffSim *sim);
 SkiffBody skiff_body(const SkiffSim *sim, int index);
 /* Adds a force (N) and a torque about the centre of mass (N m), world axes, during the next step. */
 void skiff_body_push(SkiffSim *sim, int index, const double force[3], const double torque[3]);
-/* The body's surface in body axes, relative to the centre of mass: a point p is at position + R p in the world. Owned by the simulation. */
+/* The body's surface in body axes, relative to the centre of mass: a point p is at position + R p in the
+ * world. Owned by the simulation. */
 void skiff_body_mesh(const SkiffSim *sim, int index, const float (**vertices)[3], uint32_t *vertex_count,
                      const uint32_t (**triangles)[3], uint32_t *triangle_count);
 
@@ -219,30 +243,34 @@ const char *skiff_phase_label(int phase);
 
 typedef struct SkiffStats {
     uint64_t step;
-    double time, dt;                  /* s, at the end of the step */
+    double time, dt; /* s, at the end of the step */
     uint32_t particles, boundary_samples, contacts;
-    uint32_t emitted, removed;        /* during the step */
+    uint32_t emitted, removed; /* during the step */
     int density_iterations, divergence_iterations;
-    double density_error_percent;     /* mean over all particles of max(0, rho/rho0 - 1), found at the start of the step: what the last one left */
-    double density_max_percent;       /* largest rho/rho0 - 1 */
-    double divergence_error_percent;  /* mean over all of max(0, dt Drho/Dt / rho0) after the divergence solve */
-    double residual_percent;          /* mean two-sided residual of the density solve */
-    double neighbours;                /* mean number of fluid and boundary neighbours, without the particle itself */
-    double mean_speed, max_speed;     /* m/s */
-    double mean_height;               /* mean y, m */
+    double density_error_percent; /* mean over all particles of max(0, rho/rho0 - 1), found at the start of
+                                     the step: what the last one left */
+    double density_max_percent;   /* largest rho/rho0 - 1 */
+    double
+        divergence_error_percent; /* mean over all of max(0, dt Drho/Dt / rho0) after the divergence solve */
+    double residual_percent;      /* mean two-sided residual of the density solve */
+    double neighbours; /* mean number of fluid and boundary neighbours, without the particle itself */
+    double mean_speed, max_speed;            /* m/s */
+    double mean_height;                      /* mean y, m */
     double kinetic_energy, potential_energy; /* J, of the fluid */
-    double momentum[3];               /* kg m/s, of the fluid */
+    double momentum[3];                      /* kg m/s, of the fluid */
     double phase_ms[SKIFF_PHASE_COUNT];
     double step_ms;
 } SkiffStats;
 const SkiffStats *skiff_stats(const SkiffSim *sim);
 
-/* Probe channels, in the order of the def: a height or pressure gives one value, a force six (fx fy fz tx ty tz). */
+/* Probe channels, in the order of the def: a height or pressure gives one value, a force six (fx fy fz tx ty
+ * tz). */
 int skiff_probe_channel_count(const SkiffSim *sim);
 const char *skiff_probe_channel_name(const SkiffSim *sim, int channel); /* "name" or "name.fx" */
 void skiff_probe_read(const SkiffSim *sim, double *values);
 
-/* XXH3 of the whole state: time, particles, warm starts, bodies. Equal for equal states whatever threads, ISA or machine made them. */
+/* XXH3 of the whole state: time, particles, warm starts, bodies. Equal for equal states whatever threads, ISA
+ * or machine made them. */
 uint64_t skiff_hash(const SkiffSim *sim);
 
 /* Bytes held by the simulation. */
@@ -252,7 +280,8 @@ uint64_t skiff_memory(const SkiffSim *sim);
 
 /* Saves everything that the next steps depend on. ERR_IO: the old file, if any, is intact. */
 bool skiff_save(const SkiffSim *sim, const char *path, Err *err);
-/* Replaces the state of a simulation made from the same def. ERR_INPUT when the file is damaged or belongs to another def; sim is then unchanged. */
+/* Replaces the state of a simulation made from the same def. ERR_INPUT when the file is damaged or belongs to
+ * another def; sim is then unchanged. */
 bool skiff_load(SkiffSim *sim, const char *path, Err *err);
 
 #ifdef __cplusplus

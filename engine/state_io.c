@@ -1,4 +1,5 @@
-/* Saving and loading a simulation's state. What is saved is what the next step depends on; everything else a step makes anew. */
+/* Saving and loading a simulation's state. What is saved is what the next step depends on; everything else a
+ * step makes anew. */
 #include "sim.h"
 
 #include <stdio.h>
@@ -20,8 +21,8 @@ static void body_from_scalars(Body *body, const double *in) {
     memcpy(body->angular_velocity, in + 10, 3 * sizeof(double));
 }
 
-static void add_field(StateField *fields, uint32_t *count, const char *name, StateType type, uint32_t components,
-                      uint64_t elements, const void *data) {
+static void add_field(StateField *fields, uint32_t *count, const char *name, StateType type,
+                      uint32_t components, uint64_t elements, const void *data) {
     StateField *field = &fields[(*count)++];
     *field = (StateField){.type = type, .components = components, .count = elements, .data = data};
     snprintf(field->name, sizeof field->name, "%s", name);
@@ -46,8 +47,8 @@ bool skiff_save(const SkiffSim *sim, const char *path, Err *err) {
     add_field(fields, &count, "header", STATE_U64, 1, 3, header);
     add_field(fields, &count, "time_and_origin", STATE_F64, 1, 4, place);
     for (int f = 0; f < PARTICLE_FIELD_COUNT; f++)
-        add_field(fields, &count, particle_fields[f].name, particle_fields[f].type, particle_fields[f].components,
-                  sim->particles.count, sim->particles.front[f].data);
+        add_field(fields, &count, particle_fields[f].name, particle_fields[f].type,
+                  particle_fields[f].components, sim->particles.count, sim->particles.front[f].data);
     add_field(fields, &count, "bodies", STATE_F64, BODY_SCALARS, (uint64_t)sim->body_count, bodies);
     add_field(fields, &count, "blocks_emitted", STATE_I32, 1, (uint64_t)sim->block_count, emitted);
     const bool good = state_file_write(path, STATE_VERSION, fields, count, err);
@@ -62,13 +63,15 @@ static bool load_fields(SkiffSim *sim, const StateFile *file, const char *path, 
     const StateField *place = state_file_field(file, "time_and_origin", STATE_F64, 1, 4, err);
     const StateField *bodies =
         state_file_field(file, "bodies", STATE_F64, BODY_SCALARS, (uint64_t)sim->body_count, err);
-    const StateField *emitted = state_file_field(file, "blocks_emitted", STATE_I32, 1, (uint64_t)sim->block_count, err);
+    const StateField *emitted =
+        state_file_field(file, "blocks_emitted", STATE_I32, 1, (uint64_t)sim->block_count, err);
     const StateField *position = state_file_field(file, "position", STATE_F32, 4, UINT64_MAX, err);
     if (!header || !place || !bodies || !emitted || !position)
         return false;
     const uint64_t *numbers = header->data;
     if (numbers[0] != sim->def_hash)
-        return err_set(err, ERR_INPUT, "%s: the state was saved by another scene, or by this one with other settings", path);
+        return err_set(err, ERR_INPUT,
+                       "%s: the state was saved by another scene, or by this one with other settings", path);
     if (position->count > sim->particles.capacity)
         return err_set(err, ERR_INPUT, "%s: holds %llu particles, the scene has room for %u", path,
                        (unsigned long long)position->count, sim->particles.capacity);
@@ -113,6 +116,6 @@ bool skiff_load(SkiffSim *sim, const char *path, Err *err) {
                               .time = sim->time,
                               .particles = sim->particles.count,
                               .boundary_samples = sim->stats.boundary_samples};
-    return boundary_place(&sim->boundary, sim->bodies, sim->body_count, sim->origin, sim->kernel.support, sim->threads,
-                          err);
+    return boundary_place(&sim->boundary, sim->bodies, sim->body_count, sim->origin, sim->kernel.support,
+                          sim->threads, err);
 }

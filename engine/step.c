@@ -1,7 +1,8 @@
 /* ONE STEP, TOP TO BOTTOM. Read this first.
  *
  * [Carensac2023 alg. 2], with the pressure solves of dfsph.c:
- *   emit blocks -> move body samples -> sort -> search -> boundary terms -> divergence solve -> gravity and viscosity -> density solve -> advance. */
+ *   emit blocks -> move body samples -> sort -> search -> boundary terms -> divergence solve -> gravity and
+ * viscosity -> density solve -> advance. */
 #define _POSIX_C_SOURCE 200809L
 #include "sim.h"
 
@@ -48,8 +49,8 @@ static bool sort_particles(SkiffSim *sim, Err *err) {
 }
 
 static bool find_neighbours(SkiffSim *sim, Err *err) {
-    return rows_build(&sim->rows, sim->passes, &sim->grid, &sim->particles, &sim->kernel, sim->volume, sim->threads,
-                      err);
+    return rows_build(&sim->rows, sim->passes, &sim->grid, &sim->particles, &sim->kernel, sim->volume,
+                      sim->threads, err);
 }
 
 static bool add_boundary(SkiffSim *sim, Err *err) {
@@ -193,12 +194,13 @@ static bool report_fault(SkiffSim *sim, Err *err) {
         const double density = (double)sim->rows.pairs.density[i];
         if (speed <= (double)sim->params.speed_limit && density <= (double)sim->params.density_limit)
             continue;
-        return err_set(err, ERR_DIVERGED,
-                       "particle %llu at (%.4g, %.4g, %.4g) m has speed %.4g m/s (limit %g) and density %.4g of rest "
-                       "(limit %g)",
-                       (unsigned long long)particles->id[i],
-                       (double)x[0] + sim->origin[0], (double)x[1] + sim->origin[1], (double)x[2] + sim->origin[2],
-                       speed, (double)sim->params.speed_limit, density, (double)sim->params.density_limit);
+        return err_set(
+            err, ERR_DIVERGED,
+            "particle %llu at (%.4g, %.4g, %.4g) m has speed %.4g m/s (limit %g) and density %.4g of rest "
+            "(limit %g)",
+            (unsigned long long)particles->id[i], (double)x[0] + sim->origin[0],
+            (double)x[1] + sim->origin[1], (double)x[2] + sim->origin[2], speed,
+            (double)sim->params.speed_limit, density, (double)sim->params.density_limit);
     }
     return true;
 }
@@ -210,8 +212,8 @@ static bool check_bodies(const SkiffSim *sim, Err *err) {
             speed += sim->bodies[b].velocity[k] * sim->bodies[b].velocity[k];
         speed = sqrt(speed);
         if (!(speed <= (double)sim->params.speed_limit))
-            return err_set(err, ERR_DIVERGED, "body '%s' has speed %g m/s (limit %g)", sim->bodies[b].name, speed,
-                           (double)sim->params.speed_limit);
+            return err_set(err, ERR_DIVERGED, "body '%s' has speed %g m/s (limit %g)", sim->bodies[b].name,
+                           speed, (double)sim->params.speed_limit);
     }
     return true;
 }

@@ -63,7 +63,8 @@ SkiffBody skiff_body(const SkiffSim *sim, int index) {
     const double *force = ((double(*)[6])sim->object_forces.data)[1 + index];
     memcpy(view.force, force, sizeof view.force);
     memcpy(view.torque, force + 3, sizeof view.torque);
-    const BoundarySamples *samples = body->fixed ? &sim->boundary.fixed.samples : &sim->boundary.moving.samples;
+    const BoundarySamples *samples =
+        body->fixed ? &sim->boundary.fixed.samples : &sim->boundary.moving.samples;
     for (uint32_t s = 0; s < samples->count; s++)
         view.sample_count += samples->object[s] == 1 + index;
     return view;
@@ -108,8 +109,8 @@ uint64_t skiff_memory(const SkiffSim *sim) {
     for (int f = 0; f < PARTICLE_FIELD_COUNT; f++)
         total += sim->particles.front[f].size + sim->particles.back[f].size;
     const Grid *grid = &sim->grid;
-    total += grid->start_buffer.size + grid->cell_buffer.size + grid->order_buffer.size + grid->unsorted_buffer.size +
-             grid->histogram_buffer.size;
+    total += grid->start_buffer.size + grid->cell_buffer.size + grid->order_buffer.size +
+             grid->unsorted_buffer.size + grid->histogram_buffer.size;
     const Rows *rows = &sim->rows;
     total += rows->pool.size + rows->slice_start.size + rows->slice_length.size + rows->density.size +
              rows->gradient_sum.size + rows->neighbour_counts.size + rows->scratch.size;
@@ -117,7 +118,8 @@ uint64_t skiff_memory(const SkiffSim *sim) {
         const BoundarySet *set = m ? &sim->boundary.moving : &sim->boundary.fixed;
         total += set->buffer.size + set->cells.size + set->occupied.size + set->samples.capacity * 36u;
     }
-    total += sim->boundary.contact_buffer.size + sim->boundary.span_buffer.size + sim->boundary.centre_buffer.size +
-             sim->boundary.partial_buffer.size;
-    return total + sim->dfsph.buffer.size + sim->total_pressure.size + sim->object_forces.size + sim->sums.size;
+    total += sim->boundary.contact_buffer.size + sim->boundary.span_buffer.size +
+             sim->boundary.centre_buffer.size + sim->boundary.partial_buffer.size;
+    return total + sim->dfsph.buffer.size + sim->total_pressure.size + sim->object_forces.size +
+           sim->sums.size;
 }

@@ -1,8 +1,9 @@
 /* Sixteen float lanes, whatever the machine: one AVX-512 register, two AVX2 registers, or a plain array.
  *
- * Every operation here gives the same bits on every path (IEEE single operations, explicit fused multiply-add, fixed reduction trees), so
- * a pass written with it once gives the same result on every instruction set. No approximate instruction (rcp, rsqrt) is used: they differ
- * between vendors. Included by passes.c only, which defines SIMD_AVX512, SIMD_AVX2 or neither. */
+ * Every operation here gives the same bits on every path (IEEE single operations, explicit fused
+ * multiply-add, fixed reduction trees), so a pass written with it once gives the same result on every
+ * instruction set. No approximate instruction (rcp, rsqrt) is used: they differ between vendors. Included by
+ * passes.c only, which defines SIMD_AVX512, SIMD_AVX2 or neither. */
 #ifndef SKIFF_BASE_SIMD_H
 #define SKIFF_BASE_SIMD_H
 
@@ -117,7 +118,8 @@ static inline void vf_transpose4(__m512 r[4], Vf *x, Vf *y, Vf *z, Vf *w) {
     *z = _mm512_castpd_ps(_mm512_unpacklo_pd(_mm512_castps_pd(t1), _mm512_castps_pd(t3)));
     *w = _mm512_castpd_ps(_mm512_unpackhi_pd(_mm512_castps_pd(t1), _mm512_castps_pd(t3)));
 }
-/* Four floats each of base[index[lane]]. One 128-bit load a lane and a transpose beat four gathers by a third. */
+/* Four floats each of base[index[lane]]. One 128-bit load a lane and a transpose beat four gathers by a
+ * third. */
 static inline void vf_gather4(const Float4 *base, Vi index, Vf *x, Vf *y, Vf *z, Vf *w) {
     int32_t id[LANES] __attribute__((aligned(64)));
     _mm512_store_si512(id, index);
@@ -163,7 +165,8 @@ static inline float vf_sum(Vf a) {
     q = _mm_add_ps(q, _mm_movehl_ps(q, q));
     return _mm_cvtss_f32(_mm_add_ss(q, _mm_movehdup_ps(q)));
 }
-/* Appends ids[lane] to out for every set lane, in lane order; may write up to 16 places; returns how many count. */
+/* Appends ids[lane] to out for every set lane, in lane order; may write up to 16 places; returns how many
+ * count. */
 static inline int vi_compress(int32_t *out, const int32_t *ids, Vm m) {
     /* compress in the register, then store: compressing to memory is microcoded on Zen 4 */
     _mm512_storeu_si512(out, _mm512_maskz_compress_epi32(m, _mm512_loadu_si512(ids)));
@@ -539,8 +542,9 @@ static inline Vi vi_lane(void) {
     return vi_load(lane);
 }
 
-/* 1 / sqrt(a), relative error below 3e-7 for normal a > 0: the bit trick of [Lomont 2003] and three Newton steps. A division and a square root
- * take three times as long, and the machines' own estimates differ from vendor to vendor. */
+/* 1 / sqrt(a), relative error below 3e-7 for normal a > 0: the bit trick of [Lomont 2003] and three Newton
+ * steps. A division and a square root take three times as long, and the machines' own estimates differ from
+ * vendor to vendor. */
 static inline Vf vf_rsqrt(Vf a) {
     const Vf half = vf_mul(a, vf_set(0.5f)), three_halves = vf_set(1.5f);
     Vf y = vf_rsqrt_seed(a, 0x5f375a86);

@@ -1,0 +1,270 @@
+/* The pair passes against sums taken in double precision over all pairs, against each other across
+ * instruction sets, and the operator identities the solvers rely on. */
+#include "engine/rows.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include <cmocka.h>
+
+enum { COUNT = 1500 };
+
+typedef struct Cloud {
+    Particles particles;
+    Grid grid;
+    Rows rows;
+    Kernel kernel;
+    float volume;
+} Cloud;
+
+static double random_unit(uint64_t *state) {
+    *state = *state * 6364136223846793005u + 1442695040888963407u;
+    return (double)(*state >> 11) / 9007199254740992.0;
+}
+
+/* Jittered lattice of 0.05 m, so that densities are near rest and no two points coincide; one far outlier
+ * makes lonely slices. */
+static void cloud_make(Cloud *cloud, const Passes *passes, bool wide) {
+    Err err = {0};
+    *cloud = (Cloud){.kernel = kernel_make(0.1), .volume = 0.8f * 0.05f * 0.05f * 0.05f};
+    assert_true(particles_reserve(&cloud->particles, COUNT, &err));
+    uint64_t seed = 7;
+    for (int i = 0; i < COUNT; i++) {
+        float p[3], v[3];
+        const int at[3] = {i % 15, i / 15 % 10, i / 150};
+        for (int k = 0; k < 3; k++) {
+            p[k] = (float)(0.047 * at[k] + 0.03 * random_unit(&seed));
+            v[k] = (float)(random_unit(&seed) - 0.5);
+        }
+        if (i == COUNT - 1)
+            p[1] = 2.0f;
+        particles_append(&cloud->particles, p, v, 0.0);
+        cloud->particles.pressure[i] = (float)random_unit(&seed);
+    }
+    const GridBounds domain = {{-5, -5, -5}, {5, 5, 5}};
+    cloud->rows.wide = wide;
+    assert_true(grid_sort(&cloud->grid, &cloud->particles, 0.1f, &domain, NULL, 1, &err));
+    assert_true(rows_build(&cloud->rows, passes, &cloud->grid, &cloud->particles, &cloud->kernel,
+                           cloud->volume, 1, &err));
+    assert_int_equal(cloud->rows.wide, wide);
+    /* what the boundary pass does when there is no boundary */
+    const float unit = cloud->rows.pairs.gradient_unit;
+    Float4 *sum = cloud->rows.gradient_sum.data;
+    for (int i = 0; i < COUNT; i++) {
+        for (int k = 0; k < 3; k++)
+            sum[i][k] *= unit;
+        sum[i][3] *= unit * unit;
+        sum[i][3] += sum[i][0] * sum[i][0] + sum[i][1] * sum[i][1] + sum[i][2] * sum[i][2];
+    }
+}
+
+static void cloud_free(Cloud *cloud) {
+    particles_free(&cloud->particles);
+    grid_free(&cloud->grid);
+    rows_free(&cloud->rows);
+}
+
+static double pair(const Cloud *cloud, int i, int j, double d[3]) {
+    double sq = 0.0;
+    for (int k = 0; k < 3; k++) {
+        d[k] = (double)cloud->particles.position[i][k] - (double)cloud->particles.position[j][k];
+        sq += d[k] * d[k];
+    }
+    return sqrt(sq);
+}
+
+static void test_against_all_pairs(void **state) {
+    (void)state;
+    Cloud cloud;
+    cloud_make(&cloud, &passes_plain, false);
+    const double volume = cloud.volume;
+    static Float4 acceleration[COUNT + BLOCK];
+    static float divergence[COUNT + BLOCK];
+    const PairData *pairs = &cloud.rows.pairs;
+    for (uint32_t block = 0; block < particles_blocks(&cloud.particles); block++) {
+        passes_plain.accelerate(pairs, cloud.particles.pressure, acceleration, block);
+        passes_plain.divergence(pairs, (const Float4 *)cloud.particles.velocity, divergence, block);
+    }
+    double gradient_norm = 0.0;
+    for (int i = 0; i < COUNT; i++) {
+        double density = (double)cloud.kernel.w_scale, a[3] = {0}, div = 0.0, diagonal = 0.0, sum[3] = {0};
+        int neighbours = 0;
+        for (int j = 0; j < COUNT; j++) {
+            double d[3];
+            const double r = pair(&cloud, i, j, d);
+            if (i == j || r >= 0.1)
+                continue;
+            neighbours++;
+            density += (double)kernel_w(&cloud.kernel, (float)r);
+            const double factor = volume * kernel_gradient_factor(&cloud.kernel, r);
+            for (int k = 0; k < 3; k++) {
+                const double g = factor * d[k];
+                sum[k] += g;
+                diagonal += g * g;
+                a[k] += ((double)cloud.particles.pressure[i] + (double)cloud.particles.pressure[j]) * g;
+                div += ((double)cloud.particles.velocity[i][k] - (double)cloud.particles.velocity[j][k]) * g;
+                gradient_norm = fmax(gradient_norm, fabs(g));
+            }
+        }
+        for (int k = 0; k < 3; k++)
+            diagonal += sum[k] * sum[k];
+        assert_int_equal(cloud.rows.neighbours[i], neighbours);
+        assert_float_equal(pairs->density[i], density * volume, 1e-5);
+        /* each of 34 pairs is rounded to 1/65534 of the largest gradient */
+        const double rounding = 34.0 * 2.0 * (double)pairs->gradient_unit;
+        for (int k = 0; k < 3; k++)
+            assert_float_equal(acceleration[i][k], a[k], rounding);
+        assert_float_equal(divergence[i], div, 3.0 * rounding);
+        assert_float_equal(pairs->gradient_sum[i][3], diagonal, 1e-3 * (diagonal + 1.0));
+    }
+    assert_true(gradient_norm <= 32767.0 * (double)pairs->gradient_unit);
+    cloud_free(&cloud);
+}
+
+/* <D^T p, v> = <p, D v> and sum D^T p = 0: the pressure solve is symmetric and conserves momentum. */
+static void test_adjoint(void **state) {
+    (void)state;
+    Cloud cloud;
+    cloud_make(&cloud, &passes_plain, false);
+    static Float4 acceleration[COUNT + BLOCK];
+    static float divergence[COUNT + BLOCK];
+    for (uint32_t block = 0; block < particles_blocks(&cloud.particles); block++) {
+        passes_plain.accelerate(&cloud.rows.pairs, cloud.particles.pressure, acceleration, block);
+        passes_plain.divergence(&cloud.rows.pairs, (const Float4 *)cloud.particles.velocity, divergence,
+                                block);
+    }
+    double left = 0.0, right = 0.0, total[3] = {0}, scale = 0.0;
+    for (int i = 0; i < COUNT; i++) {
+        right += (double)cloud.particles.pressure[i] * (double)divergence[i];
+        for (int k = 0; k < 3; k++) {
+            left += (double)acceleration[i][k] * (double)cloud.particles.velocity[i][k];
+            total[k] += (double)acceleration[i][k];
+            scale += fabs((double)acceleration[i][k]);
+        }
+    }
+    assert_float_equal(left, right, 1e-6 * scale);
+    for (int k = 0; k < 3; k++)
+        assert_float_equal(total[k], 0.0, 1e-6 * scale);
+    cloud_free(&cloud);
+}
+
+static uint64_t bits(const void *data, size_t size) {
+    uint64_t hash = 1469598103934665603u;
+    for (size_t k = 0; k < size; k++)
+        hash = (hash ^ ((const uint8_t *)data)[k]) * 1099511628211u;
+    return hash;
+}
+
+static uint64_t all_bits(const Passes *passes, bool wide) {
+    Cloud cloud;
+    cloud_make(&cloud, passes, wide);
+    static Float4 acceleration[COUNT + BLOCK], velocity[COUNT + BLOCK];
+    static float divergence[COUNT + BLOCK];
+    const ForceJob job = {.pairs = &cloud.rows.pairs,
+                          .velocity = (const Float4 *)cloud.particles.velocity,
+                          .result = velocity,
+                          .gravity_dt = {0, -0.03f, 0},
+                          .viscosity = 0.02f};
+    for (uint32_t block = 0; block < particles_blocks(&cloud.particles); block++) {
+        passes->accelerate(&cloud.rows.pairs, cloud.particles.pressure, acceleration, block);
+        passes->divergence(&cloud.rows.pairs, (const Float4 *)cloud.particles.velocity, divergence, block);
+        passes->forces(&job, block);
+    }
+    const uint64_t hash = bits(cloud.rows.pairs.density, COUNT * sizeof(float)) * 3 +
+                          bits(cloud.rows.pairs.gradient_sum, COUNT * sizeof(Float4)) * 5 +
+                          bits(acceleration, COUNT * sizeof(Float4)) * 7 +
+                          bits(velocity, COUNT * sizeof(Float4)) * 11 +
+                          bits(divergence, COUNT * sizeof(float)) * 13;
+    cloud_free(&cloud);
+    return hash;
+}
+
+static void test_same_bits(void **state) {
+    (void)state;
+    const uint64_t plain = all_bits(&passes_plain, false);
+    assert_true(plain == all_bits(&passes_plain, true));
+#ifdef SKIFF_HAVE_X86
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
+        assert_true(plain == all_bits(&passes_avx2, false));
+        assert_true(plain == all_bits(&passes_avx2, true));
+    }
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+        __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq")) {
+        assert_true(plain == all_bits(&passes_avx512, false));
+        assert_true(plain == all_bits(&passes_avx512, true));
+    }
+#endif
+}
+
+/* Too many neighbours is an error that names the particle, not an overflow. */
+static void test_crowd(void **state) {
+    (void)state;
+    Err err = {0};
+    Particles particles = {0};
+    Grid grid = {0};
+    static Rows rows;
+    const Kernel kernel = kernel_make(0.1);
+    const GridBounds domain = {{-1, -1, -1}, {1, 1, 1}};
+    assert_true(particles_reserve(&particles, 700, &err));
+    for (int i = 0; i < 700; i++)
+        particles_append(&particles, (const float[3]){1e-4f * (float)i, 0, 0}, (const float[3]){0}, 0.0);
+    assert_true(grid_sort(&grid, &particles, 0.1f, &domain, NULL, 1, &err));
+    assert_false(rows_build(&rows, &passes_plain, &grid, &particles, &kernel, 1e-4f, 1, &err));
+    assert_int_equal(err.code, ERR_DIVERGED);
+    assert_non_null(strstr(err.message, "more than 496 neighbours"));
+    particles_free(&particles);
+    grid_free(&grid);
+    rows_free(&rows);
+}
+
+/* The sort is stable and the same for every number of threads; particles outside go, or are named. */
+static void test_sort(void **state) {
+    (void)state;
+    uint64_t expected = 0;
+    for (int threads = 1; threads <= 8; threads = threads * 2 + 1) {
+        Err err = {0};
+        Particles particles = {0};
+        Grid grid = {0};
+        uint64_t seed = 3;
+        assert_true(particles_reserve(&particles, 5000, &err));
+        for (int i = 0; i < 5000; i++) {
+            float p[3];
+            for (int k = 0; k < 3; k++)
+                p[k] = (float)random_unit(&seed);
+            particles_append(&particles, p, (const float[3]){0}, 0.0);
+        }
+        const GridBounds domain = {{0, 0, 0}, {1, 0.9f, 1}};
+        uint32_t removed = 0;
+        assert_false(grid_sort(&grid, &particles, 0.1f, &domain, NULL, threads, &err));
+        assert_int_equal(err.code, ERR_DIVERGED);
+        assert_true(grid_sort(&grid, &particles, 0.1f, &domain, &removed, threads, &err));
+        assert_int_equal(particles.count + removed, 5000);
+        assert_in_range(removed, 400, 600);
+        for (uint32_t i = 1; i < particles.count; i++) {
+            assert_true(grid.cell[i] >= grid.cell[i - 1]);
+            if (grid.cell[i] == grid.cell[i - 1])
+                assert_true(particles.id[i] > particles.id[i - 1]);
+            assert_int_equal(grid.cell[i], grid_cell_of(&grid.cells, particles.position[i]));
+        }
+        const uint64_t hash = bits(particles.position, particles.count * sizeof(Float4));
+        assert_true(threads == 1 || hash == expected);
+        expected = hash;
+        particles_free(&particles);
+        grid_free(&grid);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_against_all_pairs),
+        cmocka_unit_test(test_adjoint),
+        cmocka_unit_test(test_same_bits),
+        cmocka_unit_test(test_crowd),
+        cmocka_unit_test(test_sort),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
