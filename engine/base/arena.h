@@ -1,5 +1,6 @@
-/* Named memory arenas: sized up front, carved linearly, freed as one. Nothing is allocated during a steady step.
- * Blocks are aligned to 64 bytes and zeroed; large ones ask for huge pages (streaming passes gain 20 % from them). */
+/* Named memory arenas: sized up front, carved linearly, freed as one. Nothing is allocated during a steady
+ * step. Blocks are aligned to 64 bytes and zeroed; large ones ask for huge pages (streaming passes gain 20 %
+ * from them). */
 #ifndef SKIFF_BASE_ARENA_H
 #define SKIFF_BASE_ARENA_H
 
@@ -15,8 +16,8 @@ typedef struct Buffer {
     const char *name;
 } Buffer;
 
-/* Makes the block at least `size` bytes. Old content is kept, new bytes are zero. False (ERR_INPUT, with name and
- * size) when memory is exhausted; the buffer is then unchanged. */
+/* Makes the block at least `size` bytes. Old content is kept, new bytes are zero. False (ERR_INPUT, with name
+ * and size) when memory is exhausted; the buffer is then unchanged. */
 bool buffer_reserve(Buffer *buffer, const char *name, size_t size, Err *err);
 void buffer_free(Buffer *buffer);
 

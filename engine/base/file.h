@@ -1,4 +1,5 @@
-/* Whole files: read at once, written under a temporary name, flushed, renamed. A reader never sees half a file. */
+/* Whole files: read at once, written under a temporary name, flushed, renamed. A reader never sees half a
+ * file. */
 #ifndef SKIFF_BASE_FILE_H
 #define SKIFF_BASE_FILE_H
 
@@ -7,11 +8,13 @@
 #include <stdint.h>
 #include <stdio.h>
 
-/* Reads a whole regular file. *data is malloc'ed, zero-terminated past `size`, owned by the caller (free). ERR_INPUT when it
- * does not exist or is not a regular file, ERR_IO when reading fails, ERR_INPUT when larger than max_size bytes. */
+/* Reads a whole regular file. *data is malloc'ed, zero-terminated past `size`, owned by the caller (free).
+ * ERR_INPUT when it does not exist or is not a regular file, ERR_IO when reading fails, ERR_INPUT when larger
+ * than max_size bytes. */
 bool file_read(const char *path, size_t max_size, char **data, size_t *size, Err *err);
 
-/* Opens `path`.tmp for writing (binary). file_commit flushes, fsyncs, closes and renames it to `path`; file_abort removes it. */
+/* Opens `path`.tmp for writing (binary). file_commit flushes, fsyncs, closes and renames it to `path`;
+ * file_abort removes it. */
 typedef struct FileWriter {
     FILE *stream;
     char path[4096];
