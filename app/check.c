@@ -32,7 +32,7 @@ static void print_summary(const Scene *scene, const SkiffSim *sim) {
     fprintf(stderr, "%s: ok\n", scene->file);
     fprintf(stderr, "  particles         %u\n", skiff_particles(sim).count);
     if (later > 0)
-        fprintf(stderr, "  blocks emitted later %d\n", later);
+        fprintf(stderr, "  emitted later     %d blocks\n", later);
     fprintf(stderr, "  boundary samples  %u\n", summary_sample_count(sim));
     fprintf(stderr, "  duration          %g s, %.0f steps of %g ms\n", scene->duration, scene->duration / dt,
             1000 * dt);

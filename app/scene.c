@@ -258,4 +258,7 @@ void scene_name(const Scene *scene, char *out, size_t size) {
     char *dot = strrchr(out, '.');
     if (dot && dot != out && strcmp(dot, ".json") == 0)
         *dot = '\0';
+    for (char *c = out; *c; c++) /* it becomes a CSV cell */
+        if (*c == ',' || *c == '"' || (unsigned char)*c < ' ')
+            *c = '_';
 }
