@@ -78,9 +78,20 @@ static Swing swing_measure(const double *q, int count, double dt) {
     return swing;
 }
 
-static void wave(Experiment *experiment, float length, int layers, double viscosity, const char *name) {
+typedef struct Case {
+    const char *name;
+    float length, viscosity;
+    int layers;
+    double amplitude; /* of the surface, in depths */
+    bool judged;
+} Case;
+
+static void wave(Experiment *experiment, const Case *wanted) {
+    const char *name = wanted->name;
+    const float length = wanted->length;
+    const int layers = wanted->layers;
     SkiffDef def = experiment_def(experiment, 0.025f, 0.003f);
-    def.params.viscosity = (float)viscosity;
+    def.params.viscosity = wanted->viscosity;
     experiment_tank(&def, length, 0.05f * (float)layers + 0.5f, 0.5f);
     const int along = (int)((length - 0.05f) / 0.05f + 0.5f);
     const SkiffBlockDef block = experiment_block(&def, along, layers, 9);
@@ -95,7 +106,8 @@ static void wave(Experiment *experiment, float length, int layers, double viscos
                        .floor = column.floor};
     const double omega = sqrt(EXPERIMENT_G * mode.k * tanh(mode.k * mode.depth)),
                  expected = 2 * EXPERIMENT_PI / omega;
-    mode_add(&mode, sim, 0.05 * mode.depth * omega);
+    const double speed = wanted->amplitude * mode.depth * omega;
+    mode_add(&mode, sim, speed);
     static double q[MAX_STEPS];
     char text[96];
     snprintf(text, sizeof text, "%s", name);
@@ -106,13 +118,17 @@ static void wave(Experiment *experiment, float length, int layers, double viscos
         experiment_step(sim);
         q[count++] = mode_project(&mode, sim);
         const double t = skiff_time(sim) - start;
-        fprintf(series.stream, "%.6g,%.6g,%.6g\n", t, q[count - 1],
-                0.05 * mode.depth * omega * cos(omega * t));
+        fprintf(series.stream, "%.6g,%.6g,%.6g\n", t, q[count - 1], speed * cos(omega * t));
     }
     experiment_close(&series);
     const Swing swing = swing_measure(q, count, (double)skiff_params(sim)->time_step);
     snprintf(text, sizeof text, "%s: period, mean of %d halves", name, swing.count);
-    experiment_check(experiment, text, swing.period, expected, 0.03 * expected, "s");
+    if (wanted->judged)
+        experiment_check(experiment, text, swing.period, expected, 0.03 * expected, "s");
+    else
+        experiment_note(experiment, text, swing.period, "s");
+    snprintf(text, sizeof text, "%s: period / linear theory", name);
+    experiment_note(experiment, text, swing.period / expected, "");
     snprintf(text, sizeof text, "%s: amplitude kept a period", name);
     experiment_aim(experiment, text, swing.kept, 0.90, true, "");
     snprintf(text, sizeof text, "%s: depth of the water", name);
@@ -122,8 +138,13 @@ static void wave(Experiment *experiment, float length, int layers, double viscos
 
 int main(int argc, char **argv) {
     Experiment experiment = experiment_begin("standing_wave", argc, argv);
-    wave(&experiment, 2.35f, 12, 0.02, "long");
-    wave(&experiment, 2.35f, 12, 0.0, "long-no-viscosity");
-    wave(&experiment, 1.2f, 24, 0.02, "deep");
+    const Case cases[] = {
+        {"long", 2.35f, 0.02f, 12, 0.1, true},
+        {"deep", 1.2f, 0.02f, 24, 0.1, true},
+        {"long-half-amplitude", 2.35f, 0.02f, 12, 0.05, false},
+        {"long-no-viscosity", 2.35f, 0.0f, 12, 0.1, false},
+    };
+    for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++)
+        wave(&experiment, &cases[k]);
     return experiment_end(&experiment);
 }
