@@ -1,6 +1,6 @@
 /* A minute at rest: the tank neither creeps nor heats up.
  *
- * Tank 1.25 x 1.5 x 1.25 m, 24 x 20 x 24 particles of r 0.025 m, dt 3 ms, 60 s. In a working solver the
+ * Tank 0.85 x 1.5 x 0.85 m, 16 x 20 x 16 particles of r 0.025 m, dt 3 ms, 60 s. In a working solver the
  * motion left over from filling dies away and the level stays; in one that feeds on its own errors speed or
  * level grow within this time. Limits: level within 0.5 d from 10 s on, both as a range and as a fitted
  * trend; mean speed of the last 10 s below that from 5 to 15 s; at most 6 density iterations on average and a
@@ -17,8 +17,8 @@ typedef struct Window {
 int main(int argc, char **argv) {
     Experiment experiment = experiment_begin("rest_60s", argc, argv);
     SkiffDef def = experiment_def(&experiment, 0.025f, 0.003f);
-    experiment_tank(&def, 1.25f, 1.5f, 1.25f);
-    const SkiffBlockDef block = experiment_block(&def, 24, 20, 24);
+    experiment_tank(&def, 0.85f, 1.5f, 0.85f);
+    const SkiffBlockDef block = experiment_block(&def, 16, 20, 16);
     def.blocks = &block;
     def.block_count = 1;
     SkiffSim *sim = experiment_create(&def);

@@ -27,28 +27,33 @@ static void profile_add(Profile *profile, const SkiffSim *sim, const ExperimentC
     }
 }
 
-/* RMSE in % of the pressure at the floor. */
-static double profile_error(const Profile *profile, double rho_g, double height,
-                            const Experiment *experiment) {
-    FileWriter series = experiment_series(experiment, "profile", "depth_m,pressure_Pa,hydrostatic_Pa");
+/* RMSE in % of the pressure at the floor, over the bins from `lowest` up. */
+static double profile_error(const Profile *profile, int lowest, double rho_g, double height) {
     double sum = 0.0;
     int used = 0;
-    for (int b = 0; b < BINS; b++) {
+    for (int b = lowest; b < BINS; b++) {
         if (profile->count[b] == 0.0)
             continue;
         const double depth = profile->depth[b] / profile->count[b];
         const double pressure = profile->pressure[b] / profile->count[b];
-        fprintf(series.stream, "%.5g,%.6g,%.6g\n", depth, pressure, rho_g * depth);
         sum += (pressure - rho_g * depth) * (pressure - rho_g * depth);
         used++;
     }
-    experiment_close(&series);
     return 100.0 * sqrt(sum / used) / (rho_g * height);
+}
+
+static void profile_write(const Profile *profile, double rho_g, const Experiment *experiment) {
+    FileWriter series = experiment_series(experiment, "profile", "depth_m,pressure_Pa,hydrostatic_Pa");
+    for (int b = 0; b < BINS; b++)
+        if (profile->count[b] > 0.0)
+            fprintf(series.stream, "%.5g,%.6g,%.6g\n", profile->depth[b] / profile->count[b],
+                    profile->pressure[b] / profile->count[b], rho_g * profile->depth[b] / profile->count[b]);
+    experiment_close(&series);
 }
 
 typedef struct Second {
     double mean_speed, mean_max, worst_mean, worst_max;
-    double floor_force, side_force, patch_pressure;
+    double floor_force, tank_force, side_force, patch_pressure;
     double density_error, density_max, iterations, divergence_iterations;
     double low, high;
     int steps;
@@ -63,6 +68,7 @@ static void second_add(Second *second, const SkiffSim *sim, double surface) {
     second->worst_mean = fmax(second->worst_mean, stats->mean_speed);
     second->worst_max = fmax(second->worst_max, stats->max_speed);
     second->floor_force -= probes[1];
+    second->tank_force -= probes[7];
     second->side_force += hypot(probes[6], probes[8]);
     second->patch_pressure += probes[12];
     second->density_error += stats->density_error_percent;
@@ -88,12 +94,16 @@ static void judge(Experiment *experiment, const SkiffSim *sim, const Second *sec
                      0.01 * weight / area, "Pa");
     experiment_check(experiment, "floor force", second->floor_force / n, weight, 0.01 * weight, "N");
     experiment_limit(experiment, "pressure profile, RMSE of the floor's",
-                     profile_error(profile, rho_g, last->height, experiment), 5.0, "%");
+                     profile_error(profile, 0, rho_g, last->height), 5.0, "%");
+    experiment_note(experiment, "the same without the layer on the floor",
+                    profile_error(profile, 1, rho_g, last->height), "%");
     experiment_limit(experiment, "mean density error", second->density_error / n, 0.01, "%");
     experiment_limit(experiment, "density iterations, mean", second->iterations / n, 6.0, "");
     experiment_note(experiment, "density, largest", second->density_max, "%");
     experiment_note(experiment, "divergence iterations, mean", second->divergence_iterations / n, "");
     experiment_note(experiment, "largest speed, mean of the second", second->mean_max / n, "m/s");
+    experiment_note(experiment, "vertical force on the whole tank / weight", second->tank_force / n / weight,
+                    "");
     experiment_note(experiment, "net side force / weight", second->side_force / n / weight, "");
     experiment_note(experiment, "pressure on a patch in the middle of the floor", second->patch_pressure / n,
                     "Pa");
@@ -144,6 +154,7 @@ int main(int argc, char **argv) {
                 skiff_stats(sim)->max_speed, column.surface, -values[1]);
     }
     experiment_close(&series);
+    profile_write(&profile, 1000.0 * EXPERIMENT_G, &experiment);
     judge(&experiment, sim, &second, &profile, &first, &column);
     skiff_destroy(sim);
     return experiment_end(&experiment);
