@@ -1,5 +1,27 @@
+/* Entry of the program. What it does is in cli.c. */
 #include "cli.h"
 
+#include <stdlib.h>
+#include <unistd.h>
+
+/* OpenMP's idle threads spin for milliseconds by default. As soon as anything else runs on the machine, the
+ * spinning takes the cores from the very threads it waits for: a step of 25 ms took 350. The runtime reads
+ * its settings before main, so the program starts itself once more with short spinning, unless the user has
+ * chosen. A shorter name of the same in LLVM's runtime is KMP_BLOCKTIME. */
+static void limit_spinning(char **argv) {
+    static const char *const settings[][2] = {{"GOMP_SPINCOUNT", "1000"}, {"KMP_BLOCKTIME", "0"}};
+    if (getenv("OMP_WAIT_POLICY") != NULL)
+        return;
+    for (size_t k = 0; k < sizeof settings / sizeof settings[0]; k++)
+        if (getenv(settings[k][0]) != NULL)
+            return;
+    for (size_t k = 0; k < sizeof settings / sizeof settings[0]; k++)
+        setenv(settings[k][0], settings[k][1], 1);
+    execv("/proc/self/exe", argv); /* where that fails the program goes on as it is */
+}
+
 int main(int argc, char **argv) {
+    if (argc > 0)
+        limit_spinning(argv);
     return cli_main(argc, argv);
 }

@@ -276,7 +276,7 @@ static void log_line(LogLevel level, const char *message, void *user) {
 
 static bool run_scene(Run *run, Err *err) {
     interrupt_hold();
-    log_set_sink(log_line, &run->progress, LOG_WARNING);
+    log_set_sink(log_line, &run->progress, LOG_INFO);
     run->scene = load_scene(run->args, err);
     if (!run->scene)
         return false;

@@ -26,7 +26,7 @@ static const float MIN_DIAGONAL = 1e-6f;
 enum { MIN_NEIGHBOURS = 20 };
 /* The two-sided residual goes this far below the one-sided tolerance, so that the usual error, measured at
  * the next step, keeps it. */
-static const double SAFETY = 0.3;
+static const double SAFETY = 0.4;
 
 bool dfsph_reserve(Dfsph *dfsph, uint32_t particle_capacity, uint32_t object_count, Err *err) {
     const size_t padded = particle_capacity + BLOCK, blocks = padded / BLOCK;
@@ -328,7 +328,7 @@ static SolveResult solve_gcr(Dfsph *dfsph, const DfsphProblem *problem, SolveKin
         cut += gcr_update(dfsph, problem, p, (float)(has_direction ? alpha : 0.0), (float)beta, &errors);
         if (!has_direction && beta == 0.0)
             break; /* the residual has nothing left along any direction */
-        if (cut > 0.1 * tolerance && iterations < limits.max) {
+        if (cut > 0.5 * tolerance && iterations < limits.max) {
             /* the projection moved P without the residual knowing */
             errors = evaluate_residual(dfsph, problem, kind, p);
             iterations++;

@@ -343,6 +343,25 @@ static inline Vi entry_index(const uint8_t *entries, uint32_t entry, bool wide) 
                 : vi_load_i16(((const RowEntry *)entries)[entry].index);
 }
 
+/* The rows are streamed once a pass, from beyond the second cache: asking this far ahead hides its latency.
+ */
+enum { PREFETCH_ENTRIES = 48 };
+
+static inline void prefetch_entry(const uint8_t *entries, uint32_t entry, bool wide) {
+    const char *at = (const char *)entries + (size_t)entry * (wide ? sizeof(RowEntryWide) : sizeof(RowEntry));
+    __builtin_prefetch(at);
+    __builtin_prefetch(at + 64);
+}
+
+/* Four floats of each neighbour of a slice. */
+static inline void gather_neighbours(const Float4 *slice_base, const uint8_t *entries, uint32_t entry,
+                                     bool wide, Vf *x, Vf *y, Vf *z, Vf *w) {
+    if (wide)
+        vf_gather4(slice_base, entry_index(entries, entry, true), x, y, z, w);
+    else
+        vf_gather4_i16(slice_base, ((const RowEntry *)entries)[entry].index, x, y, z, w);
+}
+
 static inline void accelerate_slices(const PairData *pairs, const float *p, Float4 *result, uint32_t block,
                                      const bool wide) {
     const Vf unit = vf_set(pairs->gradient_unit);
@@ -351,6 +370,7 @@ static inline void accelerate_slices(const PairData *pairs, const float *p, Floa
         const float *slice_p = p + first;
         Vf x = vf_zero(), y = vf_zero(), z = vf_zero();
         for (uint32_t entry = begin; entry < begin + pairs->slice_length[slice]; entry++) {
+            prefetch_entry(pairs->entries, entry + PREFETCH_ENTRIES, wide);
             const Vf neighbour_p = vf_gather(slice_p, entry_index(pairs->entries, entry, wide));
             const int16_t *gradient = entry_gradient(pairs->entries, entry, wide);
             x = vf_fma(neighbour_p, vf_load_i16(gradient), x);
@@ -380,7 +400,8 @@ static inline void divergence_slices(const PairData *pairs, const Float4 *v, flo
         const Float4 *slice_v = v + first;
         Vf sum = vf_zero(), x, y, z, w;
         for (uint32_t entry = begin; entry < begin + pairs->slice_length[slice]; entry++) {
-            vf_gather4(slice_v, entry_index(pairs->entries, entry, wide), &x, &y, &z, &w);
+            prefetch_entry(pairs->entries, entry + PREFETCH_ENTRIES, wide);
+            gather_neighbours(slice_v, pairs->entries, entry, wide, &x, &y, &z, &w);
             const int16_t *gradient = entry_gradient(pairs->entries, entry, wide);
             sum = vf_fma(x, vf_load_i16(gradient), sum);
             sum = vf_fma(y, vf_load_i16(gradient + SLICE), sum);
@@ -416,13 +437,13 @@ static void forces(const ForceJob *job, uint32_t block) {
         vf_load4(job->velocity + first, &vx, &vy, &vz, &w);
         const uint32_t length = job->viscosity > 0.0f ? pairs->slice_length[slice] : 0;
         for (uint32_t entry = begin; entry < begin + length; entry++) {
-            const Vi index = entry_index(pairs->entries, entry, pairs->wide);
-            vf_gather4(pairs->position + first, index, &x, &y, &z, &w);
+            prefetch_entry(pairs->entries, entry + PREFETCH_ENTRIES, pairs->wide);
+            gather_neighbours(pairs->position + first, pairs->entries, entry, pairs->wide, &x, &y, &z, &w);
             const Vf dx = vf_sub(px, x), dy = vf_sub(py, y), dz = vf_sub(pz, z);
             const Vf distance_sq = vf_fma(dx, dx, vf_fma(dy, dy, vf_mul(dz, dz)));
             Vf factor, weight;
             pair_kernel(&pairs->kernel, distance_sq, &factor, &weight);
-            vf_gather4(job->velocity + first, index, &x, &y, &z, &w);
+            gather_neighbours(job->velocity + first, pairs->entries, entry, pairs->wide, &x, &y, &z, &w);
             /* unused places are the particle itself: their difference is zero */
             sx = vf_fma(weight, vf_sub(vx, x), sx);
             sy = vf_fma(weight, vf_sub(vy, y), sy);

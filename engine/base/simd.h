@@ -123,12 +123,25 @@ static inline void vf_transpose4(__m512 r[4], Vf *x, Vf *y, Vf *z, Vf *w) {
 static inline void vf_gather4(const Float4 *base, Vi index, Vf *x, Vf *y, Vf *z, Vf *w) {
     int32_t id[LANES] __attribute__((aligned(64)));
     _mm512_store_si512(id, index);
+
     __m512 r[4];
     for (int k = 0; k < 4; k++) {
         r[k] = _mm512_castps128_ps512(_mm_loadu_ps(base[id[k]]));
         r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(base[id[4 + k]]), 1);
         r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(base[id[8 + k]]), 2);
         r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(base[id[12 + k]]), 3);
+    }
+    vf_transpose4(r, x, y, z, w);
+}
+/* The same with offsets in memory. Scalar loads of the offsets leave the vector units to the transpose:
+ * taking them out of a register costs as much as the rest. */
+static inline void vf_gather4_i16(const Float4 *base, const int16_t *index, Vf *x, Vf *y, Vf *z, Vf *w) {
+    __m512 r[4];
+    for (int k = 0; k < 4; k++) {
+        r[k] = _mm512_castps128_ps512(_mm_loadu_ps(base[index[k]]));
+        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(base[index[4 + k]]), 1);
+        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(base[index[8 + k]]), 2);
+        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(base[index[12 + k]]), 3);
     }
     vf_transpose4(r, x, y, z, w);
 }
@@ -303,6 +316,18 @@ static inline void avx2_gather4(const Float4 *base, const int32_t *id, __m256 ou
 static inline void vf_gather4(const Float4 *base, Vi index, Vf *x, Vf *y, Vf *z, Vf *w) {
     int32_t id[LANES];
     vi_store(id, index);
+    __m256 lo[4], hi[4];
+    avx2_gather4(base, id, lo);
+    avx2_gather4(base, id + 8, hi);
+    *x = VF(lo[0], hi[0]);
+    *y = VF(lo[1], hi[1]);
+    *z = VF(lo[2], hi[2]);
+    *w = VF(lo[3], hi[3]);
+}
+static inline void vf_gather4_i16(const Float4 *base, const int16_t *index, Vf *x, Vf *y, Vf *z, Vf *w) {
+    const int32_t id[LANES] = {index[0],  index[1],  index[2],  index[3], index[4],  index[5],
+                               index[6],  index[7],  index[8],  index[9], index[10], index[11],
+                               index[12], index[13], index[14], index[15]};
     __m256 lo[4], hi[4];
     avx2_gather4(base, id, lo);
     avx2_gather4(base, id + 8, hi);
@@ -487,6 +512,9 @@ static inline void vf_gather4(const Float4 *base, Vi index, Vf *x, Vf *y, Vf *z,
         z->v[l] = p[2];
         w->v[l] = p[3];
     }
+}
+static inline void vf_gather4_i16(const Float4 *base, const int16_t *index, Vf *x, Vf *y, Vf *z, Vf *w) {
+    vf_gather4(base, vi_load_i16(index), x, y, z, w);
 }
 static inline void vf_load4(const Float4 *p, Vf *x, Vf *y, Vf *z, Vf *w) {
     EACH_LANE {
