@@ -1,9 +1,11 @@
 /* What a closed system keeps: momentum without gravity, and energy with it.
  *
+ *
  * Momentum. Two blobs of water of 0.5 x 0.5 x 0.5 m fly at each other at 2 m/s each, off centre, without
  * gravity and without tank; then again with a free box between them, whose momentum counts too. The total
  * must stay where it was, within 1e-4 of the sum of the blobs' absolute momenta, for 0.6 s (pair forces are
  * antisymmetric, boundary forces act on both sides).
+ *
  *
  * Energy. A column of water collapses in a closed tank and sloshes for 3 s. Without input, kinetic +
  * potential energy may only fall. Datum of the potential energy: the height at which the same water would lie

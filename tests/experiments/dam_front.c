@@ -3,7 +3,9 @@
  * Column of L = 0.146 m by H = 0.292 m (Koshizuka & Oka 1996; Martin & Moyce 1952 used the same proportion)
  * in a narrow tank without friction, eight particles wide, long enough that the front meets no wall; r 0.0025
  * m, dt 0.4 ms. volumeFactor 1: the lattice is at rest density, has the column's volume and needs no
- * settling. The front is the foremost particle plus half its cell. Expected:
+ * settling. The front is the foremost particle plus half its cell.
+ *
+ * Expected:
  * data/02_dambreak_front_martinmoyce_koshizuka.csv, x* = (x - L) / H against t* = t sqrt(g / H). Six
  * digitised experiments of it make the envelope, wherever two of them at least cover a time (the computed
  * rows are left out). Inside means not farther out than one particle distance, d / H = 0.017, which is what

@@ -5,9 +5,13 @@
  * gauges H1..H4 and sensors P1..P8 as in figures 6 and 7 of the test's description. r 0.0125 m, dt 1 ms (0.2
  * of d at the largest speed, 5 m/s), 2 s. volumeFactor 1: a lattice at rest density has the column's volume
  * and needs no settling; its cells end EXPERIMENT_GAP r from the walls, where the engine keeps water anyway,
- * and it is given as many layers as the volume of the experiment's column needs. There is no gate. Expected:
+ * and it is given as many layers as the volume of the experiment's column needs. There is no gate.
+ *
+ * Expected:
  * data/01_kleefsman_heights_50hz.csv and 01_kleefsman_pressures.csv (columns of heights follow figure 6; 5 ms
- * means of pressures). H2 and H4 within an RMSE of 0.04 m over 2 s; P1 above 300 Pa first at 0.393 +- 0.03 s;
+ * means of pressures).
+ *
+ * H2 and H4 within an RMSE of 0.04 m over 2 s; P1 above 300 Pa first at 0.393 +- 0.03 s;
  * its impulse from 0.38 to 1.0 s 2901 Pa s +- 20 %. */
 #include "experiment.h"
 

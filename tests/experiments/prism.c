@@ -3,7 +3,9 @@
  * Prism of 0.5 x 0.5 x 0.8 m, free in y and about its long axis z, in a tank of 2.0 x 1.4 x 0.86 m that it
  * nearly spans (the gap at its ends is too thin for water, so the flow is that of a section); 38 x 18 x 16
  * particles of r 0.025 m, dt 3 ms. It starts turned by 30 degrees, is held for 2 s and then left for 14 s;
- * the mean angle of the last 3 s counts. Expected: 45 +- 3 degrees. Flotation of a square section: for ratios
+ * the mean angle of the last 3 s counts.
+ *
+ * Expected: 45 +- 3 degrees. Flotation of a square section: for ratios
  * between 0.28 and 0.72 the diagonal position is the stable one. */
 #include "experiment.h"
 

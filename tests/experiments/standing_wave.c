@@ -4,7 +4,9 @@
  * 4 s of settling every particle is given the velocity of the first linear standing wave, u = -U sin(kx)
  * cosh(kY) / sinh(kh), v = U cos(kx) sinh(kY) / sinh(kh), Y above the floor, k = pi / length, released from a
  * flat surface. U is chosen for an amplitude of 0.05 h. Each step the velocities are projected on that mode;
- * what the mode's velocity does is q(t) = exp(-t/tau) cos(w t). Expected: T = 2 pi / sqrt(g k tanh kh)
+ * what the mode's velocity does is q(t) = exp(-t/tau) cos(w t).
+ *
+ * Expected: T = 2 pi / sqrt(g k tanh kh)
  * (data/06_standing_wave_periods.csv holds the same formula for other tanks) with the length and depth of the
  * water itself (ExperimentColumn: walls keep it about r away), tolerance 3 %. The theory is inviscid: all
  * amplitude should be kept, apart from exp(-2 nu k^2 T), below 0.1 % in real water. Aim: at least 0.90 a
