@@ -1,18 +1,16 @@
 /* What a closed system keeps: momentum without gravity, and energy with it.
  *
- *
- * Momentum. Two blobs of water of 0.5 x 0.5 x 0.5 m fly at each other at 2 m/s each, off centre, without
+ * Momentum: two blobs of water of 0.5 x 0.5 x 0.5 m fly at each other at 2 m/s each, off centre, without
  * gravity and without tank; then again with a free box between them, whose momentum counts too. The total
- * must stay where it was, within 1e-4 of the sum of the blobs' absolute momenta, for 0.6 s (pair forces are
- * antisymmetric, boundary forces act on both sides).
+ * must stay where it was, within 1e-4 of the sum of the blobs' absolute momenta, for 0.6 s: pair forces
+ * are antisymmetric, boundary forces act on both sides.
  *
- *
- * Energy. A column of water collapses in a closed tank and sloshes for 3 s. Without input, kinetic +
- * potential energy may only fall. Datum of the potential energy: the height at which the same water would lie
- * level on the floor, so that what is measured against is the energy that can be set free and not an
+ * Energy: a column of water collapses in a closed tank and sloshes for 3 s. Without input, kinetic +
+ * potential energy may only fall. Datum of the potential energy: the height at which the same water would
+ * lie level on the floor, so that what is measured against is the energy that can be set free and not an
  * arbitrary height. Limit: never above the initial value by more than 1 % of the initial potential energy;
- * the largest rise above the lowest value so far is noted as well. A lattice of particles starts compressed
- * against nothing here: volumeFactor 1 makes its density that of rest. */
+ * the largest rise above the lowest value so far is noted as well. volumeFactor 1 makes the density of the
+ * lattice that of rest, so that none is stored as compression. */
 #include "experiment.h"
 
 typedef struct Drift {

@@ -1,18 +1,16 @@
 /* Dam break against a box: SPHERIC test 2, the MARIN experiment of Kleefsman et al. 2005 (J. Comput. Phys.
  * 206:363-393).
  *
- * Tank 3.22 x 1 x 1 m, column of 1.228 x 1 x 0.55 m at its right end, static box of 0.161 x 0.403 x 0.161 m;
- * gauges H1..H4 and sensors P1..P8 as in figures 6 and 7 of the test's description. r 0.0125 m, dt 1 ms (0.2
- * of d at the largest speed, 5 m/s), 2 s. volumeFactor 1: a lattice at rest density has the column's volume
- * and needs no settling; its cells end EXPERIMENT_GAP r from the walls, where the engine keeps water anyway,
- * and it is given as many layers as the volume of the experiment's column needs. There is no gate.
+ * Tank 3.22 x 1 x 1 m, column of 1.228 x 1 x 0.55 m at its right end, static box of 0.161 x 0.403 x 0.161
+ * m; gauges H1..H4 and sensors P1..P8 as in figures 6 and 7 of the test's description. r 0.0125 m, dt 1 ms
+ * (0.2 of d at the largest speed, 5 m/s), 2 s. volumeFactor 1: a lattice at rest density has the column's
+ * volume and needs no settling; its cells end EXPERIMENT_GAP r from the walls, where the engine keeps
+ * water anyway, and it is given as many layers as the volume of the experiment's column needs. There is no
+ * gate.
  *
- * Expected:
- * data/01_kleefsman_heights_50hz.csv and 01_kleefsman_pressures.csv (columns of heights follow figure 6; 5 ms
- * means of pressures).
- *
- * H2 and H4 within an RMSE of 0.04 m over 2 s; P1 above 300 Pa first at 0.393 +- 0.03 s;
- * its impulse from 0.38 to 1.0 s 2901 Pa s +- 20 %. */
+ * Expected: data/01_kleefsman_heights_50hz.csv and 01_kleefsman_pressures.csv (columns of heights follow
+ * figure 6). H2 and H4 within an RMSE of 0.04 m over 2 s; P1 above 300 Pa first at 0.393 +- 0.03 s; its
+ * impulse from 0.38 to 1.0 s 2901 Pa s +- 20 %. */
 #include "experiment.h"
 
 enum { GAUGES = 4, SENSORS = 8, STEPS = 2000 };

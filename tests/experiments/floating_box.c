@@ -1,17 +1,16 @@
 /* Archimedes: a box floats as deep as its density says.
  *
  * Tank 1.2 x 1.2 x 1.2 m, 23 x 13 x 23 particles of r 0.025 m; a box of 0.5 x 0.4 x 0.5 m of density ratio
- * 0.3, 0.5 and 0.8 is released at the depth of its balance, 2 d too high, and left for 6 s; the mean over the
- * last second counts. In a closed tank the level rises with the box in it, so the draft is measured from the
+ * 0.3, 0.5 and 0.8 is released 2 d above the depth of its balance and left for 6 s; the mean over the last
+ * second counts. In a closed tank the level rises with the box in it, so the draft is measured from the
  * level of the time, read by gauges away from the box.
  *
- * Expected: draft = ratio * height (geometric).
+ * Expected: draft = ratio * height (geometric). Tolerance half a particle distance, 0.025 m.
  *
- * Tolerance half a particle distance, 0.025 m.
- *
- * Reported too: water keeps about r from the hull, so a body
- * displaces a layer more than its own volume. The draft at which the hull grown by r on every side (bottom
- * and sides) displaces its weight is the "effective" one. The judgement is on the geometric draft. */
+ * Noted too: water keeps a layer away from the hull, so a body displaces more than its own volume. The
+ * draft at which the hull grown by EXPERIMENT_GAP r on every side (bottom and sides) displaces its weight
+ * is the "effective" one, and the layer that would explain the measured draft exactly is given in r. The
+ * judgement is on the geometric draft. */
 #include "experiment.h"
 
 static const float box_size[3] = {0.5f, 0.4f, 0.5f};

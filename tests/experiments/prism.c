@@ -5,8 +5,8 @@
  * particles of r 0.025 m, dt 3 ms. It starts turned by 30 degrees, is held for 2 s and then left for 14 s;
  * the mean angle of the last 3 s counts.
  *
- * Expected: 45 +- 3 degrees. Flotation of a square section: for ratios
- * between 0.28 and 0.72 the diagonal position is the stable one. */
+ * Expected: 45 +- 3 degrees. Flotation of a square section: for ratios between 0.28 and 0.72 the diagonal
+ * position is the stable one. */
 #include "experiment.h"
 
 int main(int argc, char **argv) {

@@ -1,12 +1,12 @@
 /* A minute at rest: the tank neither creeps nor heats up.
  *
  * Tank 0.85 x 1.5 x 0.85 m, 16 x 20 x 16 particles of r 0.025 m, dt 3 ms, 60 s. In a working solver the
- * motion left over from filling dies away and the level stays; in one that feeds on its own errors speed or
- * level grow within this time.
+ * motion left over from filling dies away and the level stays; in one that feeds on its own errors speed
+ * or level grow within this time.
  *
- * Limits: level within 0.5 d from 10 s on, both as a range and as a fitted
- * trend; mean speed of the last 10 s below that from 5 to 15 s; at most 6 density iterations on average and a
- * mean density error of 0.01 %. */
+ * Limits: level within 0.5 d from 10 s on, both as a range and as a fitted trend; mean speed of the last
+ * 10 s below that from 5 to 15 s; at most 6 density iterations on average and a mean density error of 0.01
+ * %. */
 #include "experiment.h"
 
 enum { WINDOWS = 12 };

@@ -1,12 +1,12 @@
-/* Water at rest: a settled tank stays calm and level, carries its weight on its floor, and its pressure grows
- * with depth.
+/* Water at rest: a settled tank stays calm and level, carries its weight on its floor, and its pressure
+ * grows with depth.
  *
  * Tank 2.45 x 1.5 x 2.45 m, 48 x 20 x 48 particles of r 0.025 m, dt 3 ms; 5 s of settling, then 1 s is
  * measured.
  *
  * Expected: hydrostatics. p = rho0 g depth, with depth below the effective surface of experiment.h
- * (ExperimentColumn); floor force = weight of the water. Limits on speed, level, density error and iterations
- * are the engine's own targets. */
+ * (ExperimentColumn); floor force = weight of the water. Limits on speed, level, density error and
+ * iterations are the engine's own targets. */
 #include "experiment.h"
 
 enum { BINS = 16 };

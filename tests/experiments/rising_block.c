@@ -1,20 +1,19 @@
-/* A light block held at the bottom of a small tank rises, leaps, and bobs: Wu et al. 2014 (Computers & Fluids
- * 100:347).
+/* A light block held at the bottom of a small tank rises, leaps, and bobs: Wu et al. 2014 (Computers &
+ * Fluids 100:347).
  *
  * Block 49 x 24 x 48 mm of density 800.52 in a tank of 150 x 140 mm with 52 mm of water (with the block in
- * it), r 1.25 mm, dt 0.8 ms, volumeFactor 1 (a lattice at rest density needs little settling at this size).
- * Held for 0.3 s, then free.
+ * it), r 1.25 mm, dt 0.8 ms, volumeFactor 1 (a lattice at rest density needs little settling at this
+ * size). Held for 0.3 s, then free. The depth is met, not the volume: walls keep water away, so the volume
+ * of the experiment would stand 5 mm higher here.
  *
- * Expected: data/04_wu2014_floating_box_rise.csv. The instant of release is not
- * sharp there (0.05 to 0.1 s), and a block that lies on the floor cannot rise here, as no particle fits under
- * it: it is held one layer of particles above the floor (4.4 r, 5.5 mm). So the curves are laid over each
- * other where the centre passes 30 mm on its way up, half of the rise, and compared from there to 1.0 s
- * later. The depth is met, not the volume: walls keep water away, so the volume of the experiment would stand
- * 5 mm higher here.
+ * Expected: data/04_wu2014_floating_box_rise.csv. The instant of release is not sharp there (0.05 to 0.1
+ * s), and a block that lies on the floor cannot rise here, as no particle fits under it: it is held one
+ * layer of particles above the floor (4.4 r, 5.5 mm). So the curves are laid over each other where the
+ * centre passes 30 mm on its way up, half of the rise, and compared from there to 1.0 s later.
  *
- * Tolerances. Height of the first peak: one particle distance, 2.5 mm: half of it for the
- * level of the water and half for the layer around the hull, the same half each that a floating box is
- * granted. RMSE of y(t): the same 2.5 mm. Time from 30 mm to the peak and period of the bobbing are noted. */
+ * Tolerances: height of the first peak within one particle distance, 2.5 mm: half of it for the level of
+ * the water and half for the layer around the hull, the same half each that a floating box is granted.
+ * RMSE of y(t): the same 2.5 mm. Times and the mean height of the bobbing are noted. */
 #include "experiment.h"
 
 enum { MAX_STEPS = 4000 };

@@ -1,14 +1,15 @@
 /* How thick particle water is: a vortex that should turn for minutes.
  *
  * Tank 1 x 0.8 x 1 m, 19 x 12 x 19 particles of r 0.025 m, dt 3 ms, settled for 6 s; then the Taylor-Green
- * vortex of vertical axis is added, u = U sin(kx) cos(kz), w = -U cos(kx) sin(kz), k = pi / width: four cells
- * that slide along frictionless walls. Velocities are projected on it each step. Expected of a fluid of
- * viscosity nu: exp(-2 nu k^2 t), so nu = -d ln U / dt / (2 k^2), whatever U. Water has 1e-6 m^2/s; XSPH with
- * 0.02 a step at this size stands for about 2e-3.
+ * vortex of vertical axis is added, u = U sin(kx) cos(kz), w = -U cos(kx) sin(kz), k = pi / width: four
+ * cells that slide along frictionless walls. Velocities are projected on it each step.
  *
- * Informational, nothing is judged: a viscosity that grows as
- * U falls, and a slow vortex that stops and turns back, show a yield stress: the settled particles resist
- * small shear like a solid. It is the noise floor of every slow motion in the other experiments. */
+ * Expected of a fluid of viscosity nu: exp(-2 nu k^2 t), so nu = -d ln U / dt / (2 k^2), whatever U. Water
+ * has 1e-6 m^2/s; XSPH with 0.02 a step at this size stands for about 2e-3.
+ *
+ * Informational, nothing is judged: a viscosity that grows as U falls, and a slow vortex that stops and
+ * turns back, show a yield stress: the settled particles resist small shear like a solid. It is the noise
+ * floor of every slow motion in the other experiments. */
 #include "experiment.h"
 
 #include <unistd.h>
