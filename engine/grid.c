@@ -17,12 +17,13 @@ static void grid_bounds(const Particles *particles, GridBounds *bounds, int thre
               : max_x, max_y, max_z)
     for (uint32_t i = 0; i < particles->count; i++) {
         const float *p = particles->position[i];
-        min_x = fminf(min_x, p[0]);
-        min_y = fminf(min_y, p[1]);
-        min_z = fminf(min_z, p[2]);
-        max_x = fmaxf(max_x, p[0]);
-        max_y = fmaxf(max_y, p[1]);
-        max_z = fmaxf(max_z, p[2]);
+        /* fminf is a call; a NaN position is found by the check of the step that made it */
+        min_x = p[0] < min_x ? p[0] : min_x;
+        min_y = p[1] < min_y ? p[1] : min_y;
+        min_z = p[2] < min_z ? p[2] : min_z;
+        max_x = p[0] > max_x ? p[0] : max_x;
+        max_y = p[1] > max_y ? p[1] : max_y;
+        max_z = p[2] > max_z ? p[2] : max_z;
     }
     *bounds = (GridBounds){{min_x, min_y, min_z}, {max_x, max_y, max_z}};
 }

@@ -12,6 +12,7 @@ PARAM_VEC3(gravity, "gravitation", 0.0f, -9.81f, 0.0f, -1e3f, 1e3f, "m/s^2", "Gr
 PARAM_FLOAT(time_step, "timeStepSize", 0.003f, 1e-7f, 1.0f, "s", "Length of a simulation step")
 PARAM_ENUM(method, "simulationMethod", 0, "dfsph", "Solver")
 PARAM_FLOAT(viscosity, "viscosity", 0.02f, 0.0f, 1.0f, "", "XSPH viscosity: share of the velocity difference to the neighbours removed a step")
+PARAM_FLOAT(wall_friction, "wallFriction", 0.0f, 0.0f, 1.0f, "", "The same towards walls and bodies; 0 is free slip, as the papers")
 PARAM_ENUM(pressure_solver, "pressureSolver", 0, "gcr|jacobi", "gcr: projected conjugate residuals; jacobi: relaxed Jacobi, as the papers")
 PARAM_FLOAT(softening, "densitySoftening", 0.25f, 0.01f, 1.0f, "", "Share of a density error that one step corrects; 1 as the papers")
 PARAM_FLOAT(warm_start, "warmStart", 1.0f, 0.0f, 1.0f, "", "Share of the last pressures that the density solve starts from; the papers' codes use 1 or 0.5")

@@ -69,6 +69,9 @@ bool block_emit(SkiffSim *sim, uint32_t *emitted, Err *err);
  * input). */
 double block_particles(const SkiffBlockDef *def, float spacing, double counts[3]);
 
+/* Gravity, viscosity and wall friction of one step, for fluid and bodies. */
+void forces_apply(SkiffSim *sim);
+
 bool probes_make(SkiffSim *sim, const SkiffDef *def, Err *err);
 void probes_free(SkiffSim *sim);
 

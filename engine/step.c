@@ -64,30 +64,6 @@ static void solve_divergence(SkiffSim *sim) {
     sim->stats.divergence_error_percent = 100.0 * result.error;
 }
 
-/* Gravity, and XSPH viscosity: neighbours exchange a share of their velocities. */
-static void apply_forces(SkiffSim *sim) {
-    const float dt = sim->params.time_step;
-    const float *g = sim->params.gravity;
-    const ForceJob job = {.pairs = &sim->rows.pairs,
-                          .velocity = (const Float4 *)sim->particles.velocity,
-                          .result = sim->dfsph.guess,
-                          .gravity_dt = {dt * g[0], dt * g[1], dt * g[2]},
-                          .viscosity = sim->params.viscosity};
-    const uint32_t blocks = particles_blocks(&sim->particles);
-#pragma omp parallel num_threads(sim->threads)
-    {
-#pragma omp for schedule(static)
-        for (uint32_t block = 0; block < blocks; block++)
-            sim->passes->forces(&job, block);
-#pragma omp for schedule(static)
-        for (uint32_t block = 0; block < blocks; block++)
-            memcpy(sim->particles.velocity + (size_t)block * BLOCK, sim->dfsph.guess + (size_t)block * BLOCK,
-                   BLOCK * sizeof(Float4));
-    }
-    for (int b = 0; b < sim->body_count; b++)
-        body_push(&sim->bodies[b], g, sim->time, (double)dt);
-}
-
 static void solve_density(SkiffSim *sim) {
     const DfsphProblem problem = step_problem(sim);
     const SolveResult result = dfsph_solve(&sim->dfsph, &problem, SOLVE_DENSITY);
@@ -244,7 +220,7 @@ bool skiff_step(SkiffSim *sim, Err *err) {
     PHASE_RUN(SEARCH, good = find_neighbours(sim, err));
     PHASE_RUN(BOUNDARY, good = add_boundary(sim, err));
     PHASE_RUN(DIVERGENCE, solve_divergence(sim));
-    PHASE_RUN(FORCES, apply_forces(sim));
+    PHASE_RUN(FORCES, forces_apply(sim));
     PHASE_RUN(PRESSURE, solve_density(sim));
     PHASE_RUN(ADVANCE, measure_forces(sim); advance(sim); good = check(sim, err));
     sim->stats.step_ms = timer_ms() - begin;

@@ -276,11 +276,41 @@ static void test_carving(void **state) {
     skiff_destroy(sim);
 }
 
+/* Water sliding over a floor: free slip keeps its speed, friction takes it; a body takes up what the water
+ * loses. */
+static void test_wall_friction(void **state) {
+    (void)state;
+    double drift[2];
+    for (int rough = 0; rough < 2; rough++) {
+        Scene scene;
+        scene_make(&scene);
+        scene.def.tank.geometry.kind = SKIFF_GEOMETRY_NONE;
+        scene.def.params.gravity[1] = 0.0f;
+        scene.def.params.wall_friction = rough ? 0.1f : 0.0f;
+        scene.def.body_count = 1;
+        scene.bodies[0].geometry.size[0] = scene.bodies[0].geometry.size[2] = 2.0f;
+        scene.bodies[0].geometry.translation[1] = -0.08f;
+        scene.block.velocity[0] = 1.0f;
+        SkiffSim *sim = accept(&scene);
+        Err err = {0};
+        const double mass = (double)sim->volume * 1000.0 * skiff_particles(sim).count;
+        for (int k = 0; k < 60; k++)
+            if (!skiff_step(sim, &err))
+                fail_msg("%s", err.message);
+        const SkiffBody body = skiff_body(sim, 0);
+        drift[rough] = body.mass * body.velocity[0];
+        assert_float_equal(skiff_stats(sim)->momentum[0] + drift[rough], mass, 1e-4 * mass);
+        assert_true(!rough || drift[rough] > 0.02 * mass);
+        skiff_destroy(sim);
+    }
+    assert_true(fabs(drift[0]) < 0.1 * drift[1]);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_refusals), cmocka_unit_test(test_blow_up),   cmocka_unit_test(test_escape),
-        cmocka_unit_test(test_emit),     cmocka_unit_test(test_flat_wall), cmocka_unit_test(test_states),
-        cmocka_unit_test(test_carving),
+        cmocka_unit_test(test_refusals), cmocka_unit_test(test_blow_up),       cmocka_unit_test(test_escape),
+        cmocka_unit_test(test_emit),     cmocka_unit_test(test_flat_wall),     cmocka_unit_test(test_states),
+        cmocka_unit_test(test_carving),  cmocka_unit_test(test_wall_friction),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,92 @@
+/* Everything that is not pressure: gravity, XSPH viscosity among the fluid [Schechter & Bridson 2012], and
+ * friction on walls and bodies, which is XSPH towards their samples: v_i loses the share  friction * sum_b
+ * psi_b W_ib  of its velocity relative to the object, and the object gets the momentum. The sum is part of
+ * every contact, so friction visits no sample. */
+#include "sim.h"
+
+/* Velocity of an object where a particle is. */
+static void object_velocity(const SkiffSim *sim, uint32_t object, const float *position, double v[3]) {
+    v[0] = v[1] = v[2] = 0.0;
+    if (object == 0)
+        return;
+    const Body *body = &sim->bodies[object - 1];
+    double arm[3];
+    for (int k = 0; k < 3; k++)
+        arm[k] = (double)position[k] - (double)sim->boundary.centres[object][k];
+    cross_product(body->angular_velocity, arm, v);
+    for (int k = 0; k < 3; k++)
+        v[k] += body->velocity[k];
+}
+
+/* Slows a block's particles; lost[object] is the velocity they lost and its moment about the object's centre.
+ */
+static void friction_block(SkiffSim *sim, uint32_t block, double (*lost)[6]) {
+    const Boundary *boundary = &sim->boundary;
+    const ContactSpan span = boundary->spans[block];
+    memset(lost, 0, boundary->object_count * sizeof *lost);
+    for (uint32_t c = span.start; c < span.start + span.count; c++) {
+        const Contact *contact = &boundary->contacts[c];
+        const float *position = sim->particles.position[contact->particle];
+        float *velocity = sim->particles.velocity[contact->particle];
+        double share = (double)(sim->params.wall_friction * contact->weight), v[3], change[3], arm[3],
+               moment[3];
+        share = share < 1.0 ? share : 1.0; /* to rest relative to the wall, not beyond */
+        object_velocity(sim, contact->object, position, v);
+        for (int k = 0; k < 3; k++) {
+            change[k] = share * ((double)velocity[k] - v[k]);
+            velocity[k] -= (float)change[k];
+            arm[k] = (double)position[k] - (double)boundary->centres[contact->object][k];
+        }
+        cross_product(arm, change, moment);
+        for (int k = 0; k < 3; k++) {
+            lost[contact->object][k] += change[k];
+            lost[contact->object][3 + k] += moment[k];
+        }
+    }
+}
+
+static void apply_friction(SkiffSim *sim) {
+    const uint32_t blocks = particles_blocks(&sim->particles), objects = sim->boundary.object_count;
+    double(*lost)[6] = sim->boundary.partial_buffer.data;
+#pragma omp parallel for schedule(static) num_threads(sim->threads)
+    for (uint32_t block = 0; block < blocks; block++)
+        friction_block(sim, block, lost + (size_t)block * objects);
+    const double mass = (double)sim->volume * (double)sim->params.rest_density;
+    for (int b = 0; b < sim->body_count; b++) {
+        double total[6] = {0}, turn[3];
+        for (uint32_t block = 0; block < blocks; block++)
+            for (int k = 0; k < 6; k++)
+                total[k] += lost[(size_t)block * objects + 1 + (uint32_t)b][k];
+        Body *body = &sim->bodies[b];
+        matrix_times((const double(*)[3])body->inv_inertia, total + 3, turn);
+        for (int k = 0; k < 3; k++) {
+            body->velocity[k] += mass * body->inv_mass[k] * total[k];
+            body->angular_velocity[k] += mass * turn[k];
+        }
+    }
+}
+
+void forces_apply(SkiffSim *sim) {
+    const float dt = sim->params.time_step;
+    const float *g = sim->params.gravity;
+    const ForceJob job = {.pairs = &sim->rows.pairs,
+                          .velocity = (const Float4 *)sim->particles.velocity,
+                          .result = sim->dfsph.guess,
+                          .gravity_dt = {dt * g[0], dt * g[1], dt * g[2]},
+                          .viscosity = sim->params.viscosity};
+    const uint32_t blocks = particles_blocks(&sim->particles);
+#pragma omp parallel num_threads(sim->threads)
+    {
+#pragma omp for schedule(static)
+        for (uint32_t block = 0; block < blocks; block++)
+            sim->passes->forces(&job, block);
+#pragma omp for schedule(static)
+        for (uint32_t block = 0; block < blocks; block++)
+            memcpy(sim->particles.velocity + (size_t)block * BLOCK, sim->dfsph.guess + (size_t)block * BLOCK,
+                   BLOCK * sizeof(Float4));
+    }
+    for (int b = 0; b < sim->body_count; b++)
+        body_push(&sim->bodies[b], g, sim->time, (double)dt);
+    if (sim->params.wall_friction > 0.0f)
+        apply_friction(sim);
+}
