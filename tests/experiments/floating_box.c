@@ -22,6 +22,7 @@ typedef struct Floating {
 static Floating float_box(const Experiment *experiment, double ratio, FileWriter *series) {
     SkiffDef def = experiment_def(experiment, 0.025f, 0.003f);
     experiment_tank(&def, 1.2f, 1.2f, 1.2f);
+    def.tank.open = false; /* a splash must not leave */
     const SkiffBlockDef block = experiment_block(&def, 23, 13, 23);
     /* of the filled, settled tank: volume over area, plus what the box displaces */
     const double water = 23.0 * 13.0 * 23.0 * 1e-4 / (1.15 * 1.15) + 0.025;
