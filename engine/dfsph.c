@@ -87,16 +87,16 @@ static void total_partials(const Dfsph *dfsph, uint32_t blocks, int count, doubl
 
 /* ---- The operator ---- */
 
-/* acceleration = D^T p for fluid and bodies. */
-static void apply_transpose(Dfsph *dfsph, const DfsphProblem *problem, const float *p) {
+/* job->result = job->base + job->scale D^T job->p for the fluid, responses = D^T job->p for the bodies. */
+static void apply_transpose(Dfsph *dfsph, const DfsphProblem *problem, const AccelerateJob *job) {
     const uint32_t blocks = particles_blocks(problem->particles);
     const PairData *pairs = &problem->rows->pairs;
     EACH_BLOCK {
-        problem->passes->accelerate(pairs, p, dfsph->acceleration, block);
+        problem->passes->accelerate(pairs, job, block);
     }
     if (!dfsph->moving)
         return;
-    boundary_impulse(problem->boundary, p, blocks, dfsph->impulses, problem->threads);
+    boundary_impulse(problem->boundary, job->p, blocks, dfsph->impulses, problem->threads);
     const double mass = (double)pairs->volume * (double)problem->params->rest_density;
     for (int b = 0; b < problem->body_count; b++) {
         const double *impulse = dfsph->impulses[1 + b];
@@ -132,19 +132,13 @@ static void divergence_block(const Dfsph *dfsph, const DfsphProblem *problem, co
         subtract_bodies(problem->boundary, velocities, result, block);
 }
 
-/* Velocity change -D^T p / dt of fluid (from `velocity` to `result`) and, if asked, of the bodies themselves.
- */
-static void apply_pressure(Dfsph *dfsph, const DfsphProblem *problem, const Float4 *velocity,
-                           Float4 *result) {
-    const uint32_t blocks = particles_blocks(problem->particles);
-    const float scale = 1.0f / problem->params->time_step;
-    const Float4 *acceleration = (const Float4 *)dfsph->acceleration;
-    EACH_BLOCK {
-        const uint32_t end = (block + 1) * BLOCK;
-        for (uint32_t i = block * BLOCK; i < end; i++)
-            for (int k = 0; k < 4; k++)
-                result[i][k] = velocity[i][k] - scale * acceleration[i][k];
-    }
+/* result = velocity - D^T p / dt for the fluid; the bodies' share stays in responses. */
+static void apply_pressure(Dfsph *dfsph, const DfsphProblem *problem, const float *p, Float4 *result) {
+    const AccelerateJob job = {.p = p,
+                               .base = (const Float4 *)problem->particles->velocity,
+                               .scale = -1.0f / problem->params->time_step,
+                               .result = result};
+    apply_transpose(dfsph, problem, &job);
 }
 
 /* Velocities of the bodies after the pressure so far. */
@@ -183,8 +177,7 @@ static inline void precondition_lanes(const float *residual, const float *p, con
 /* residual = source + dt D (v - D^T p / dt), and what follows from it. One application of A. */
 static Errors evaluate_residual(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, const float *p) {
     const uint32_t blocks = particles_blocks(problem->particles);
-    apply_transpose(dfsph, problem, p);
-    apply_pressure(dfsph, problem, (const Float4 *)problem->particles->velocity, dfsph->guess);
+    apply_pressure(dfsph, problem, p, dfsph->guess);
     double(*velocities)[6] = dfsph->impulses; /* no longer needed */
     if (dfsph->moving)
         body_velocities(dfsph, problem, velocities);
@@ -245,7 +238,8 @@ typedef struct GcrSums {
  * active set. */
 static GcrSums gcr_apply(Dfsph *dfsph, const DfsphProblem *problem, const float *p) {
     const uint32_t blocks = particles_blocks(problem->particles);
-    apply_transpose(dfsph, problem, dfsph->preconditioned);
+    const AccelerateJob job = {.p = dfsph->preconditioned, .scale = 1.0f, .result = dfsph->acceleration};
+    apply_transpose(dfsph, problem, &job);
     EACH_BLOCK {
         divergence_block(dfsph, problem, (const Float4 *)dfsph->acceleration,
                          (const double(*)[6])dfsph->responses, dfsph->new_image, block);
@@ -376,9 +370,7 @@ SolveResult dfsph_solve(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kin
     prepare(dfsph, problem, kind, p);
     const SolveResult result = params->pressure_solver == 0 ? solve_gcr(dfsph, problem, kind, p, limits)
                                                             : solve_jacobi(dfsph, problem, kind, p, limits);
-    apply_transpose(dfsph, problem, p);
-    Float4 *velocity = problem->particles->velocity;
-    apply_pressure(dfsph, problem, (const Float4 *)velocity, velocity);
+    apply_pressure(dfsph, problem, p, problem->particles->velocity);
     if (dfsph->moving) {
         const double scale = 1.0 / (double)params->time_step;
         for (int b = 0; b < problem->body_count; b++)

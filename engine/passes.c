@@ -147,7 +147,10 @@ static bool pack_slice(const SearchJob *job, uint32_t first, const int32_t count
         sum_y = vf_add(sum_y, gy);
         sum_z = vf_add(sum_z, gz);
         sum_sq = vf_fma(gx, gx, vf_fma(gy, gy, vf_fma(gz, gz, sum_sq)));
-        sum_w = vf_add(sum_w, vf_mask(valid, weight));
+        weight = vf_mask(valid, weight);
+        sum_w = vf_add(sum_w, weight);
+        vf_store_i16(job->weights + (size_t)entry * SLICE,
+                     vf_mul(weight, vf_set(32767.0f / job->kernel.w_scale)));
     }
     vf_store4(job->gradient_sum + first, sum_x, sum_y, sum_z, sum_sq);
     vf_store(job->density + first, vf_mul(vf_set(job->volume), vf_add(sum_w, vf_set(job->kernel.w_scale))));
@@ -362,12 +365,12 @@ static inline void gather_neighbours(const Float4 *slice_base, const uint8_t *en
         vf_gather4_i16(slice_base, ((const RowEntry *)entries)[entry].index, x, y, z, w);
 }
 
-static inline void accelerate_slices(const PairData *pairs, const float *p, Float4 *result, uint32_t block,
+static inline void accelerate_slices(const PairData *pairs, const AccelerateJob *job, uint32_t block,
                                      const bool wide) {
-    const Vf unit = vf_set(pairs->gradient_unit);
+    const Vf unit = vf_set(job->scale * pairs->gradient_unit), scale = vf_set(job->scale);
     for (uint32_t slice = block * BLOCK_SLICES; slice < (block + 1) * BLOCK_SLICES; slice++) {
         const uint32_t first = slice * SLICE, begin = pairs->slice_start[slice];
-        const float *slice_p = p + first;
+        const float *slice_p = job->p + first;
         Vf x = vf_zero(), y = vf_zero(), z = vf_zero();
         for (uint32_t entry = begin; entry < begin + pairs->slice_length[slice]; entry++) {
             prefetch_entry(pairs->entries, entry + PREFETCH_ENTRIES, wide);
@@ -377,19 +380,21 @@ static inline void accelerate_slices(const PairData *pairs, const float *p, Floa
             y = vf_fma(neighbour_p, vf_load_i16(gradient + SLICE), y);
             z = vf_fma(neighbour_p, vf_load_i16(gradient + 2 * SLICE), z);
         }
-        Vf gx, gy, gz, diagonal;
-        vf_load4(pairs->gradient_sum + first, &gx, &gy, &gz, &diagonal);
-        const Vf own_p = vf_load(slice_p);
-        vf_store4(result + first, vf_fma(own_p, gx, vf_mul(x, unit)), vf_fma(own_p, gy, vf_mul(y, unit)),
-                  vf_fma(own_p, gz, vf_mul(z, unit)), vf_zero());
+        Vf gx, gy, gz, unused, bx = vf_zero(), by = vf_zero(), bz = vf_zero();
+        vf_load4(pairs->gradient_sum + first, &gx, &gy, &gz, &unused);
+        if (job->base != NULL)
+            vf_load4(job->base + first, &bx, &by, &bz, &unused);
+        const Vf own_p = vf_mul(scale, vf_load(slice_p));
+        vf_store4(job->result + first, vf_fma(own_p, gx, vf_fma(x, unit, bx)),
+                  vf_fma(own_p, gy, vf_fma(y, unit, by)), vf_fma(own_p, gz, vf_fma(z, unit, bz)), vf_zero());
     }
 }
 
-static void accelerate(const PairData *pairs, const float *p, Float4 *result, uint32_t block) {
+static void accelerate(const PairData *pairs, const AccelerateJob *job, uint32_t block) {
     if (pairs->wide)
-        accelerate_slices(pairs, p, result, block, true);
+        accelerate_slices(pairs, job, block, true);
     else
-        accelerate_slices(pairs, p, result, block, false);
+        accelerate_slices(pairs, job, block, false);
 }
 
 static inline void divergence_slices(const PairData *pairs, const Float4 *v, float *result, uint32_t block,
@@ -424,27 +429,22 @@ static void divergence(const PairData *pairs, const Float4 *v, float *result, ui
 /* ---- Gravity and viscosity ---- */
 
 /* XSPH [Schechter & Bridson 2012] without its division by the density: that makes the weights symmetric, and
- * what i gives j gets. The weights are made again from the positions: storing them would make every
- * iteration's stream a quarter wider. */
+ * what i gives j gets. The weights come from the search, in a stream of their own: making them again from the
+ * positions costs twice this pass. */
 static void forces(const ForceJob *job, uint32_t block) {
     const PairData *pairs = job->pairs;
-    const Vf share = vf_set(-job->viscosity * pairs->volume);
+    const Vf share = vf_set(-job->viscosity * pairs->volume * pairs->kernel.w_scale / 32767.0f);
     for (uint32_t slice = block * BLOCK_SLICES; slice < (block + 1) * BLOCK_SLICES; slice++) {
         const uint32_t first = slice * SLICE, begin = pairs->slice_start[slice];
-        Vf px, py, pz, vx, vy, vz, w, x, y, z;
+        Vf vx, vy, vz, w, x, y, z;
         Vf sx = vf_zero(), sy = vf_zero(), sz = vf_zero();
-        vf_load4(pairs->position + first, &px, &py, &pz, &w);
         vf_load4(job->velocity + first, &vx, &vy, &vz, &w);
         const uint32_t length = job->viscosity > 0.0f ? pairs->slice_length[slice] : 0;
         for (uint32_t entry = begin; entry < begin + length; entry++) {
+            __builtin_prefetch(pairs->weights + (size_t)(entry + PREFETCH_ENTRIES) * SLICE);
             prefetch_entry(pairs->entries, entry + PREFETCH_ENTRIES, pairs->wide);
-            gather_neighbours(pairs->position + first, pairs->entries, entry, pairs->wide, &x, &y, &z, &w);
-            const Vf dx = vf_sub(px, x), dy = vf_sub(py, y), dz = vf_sub(pz, z);
-            const Vf distance_sq = vf_fma(dx, dx, vf_fma(dy, dy, vf_mul(dz, dz)));
-            Vf factor, weight;
-            pair_kernel(&pairs->kernel, distance_sq, &factor, &weight);
             gather_neighbours(job->velocity + first, pairs->entries, entry, pairs->wide, &x, &y, &z, &w);
-            /* unused places are the particle itself: their difference is zero */
+            const Vf weight = vf_load_i16(pairs->weights + (size_t)entry * SLICE);
             sx = vf_fma(weight, vf_sub(vx, x), sx);
             sy = vf_fma(weight, vf_sub(vy, y), sy);
             sz = vf_fma(weight, vf_sub(vz, z), sz);

@@ -91,6 +91,7 @@ typedef struct PairData {
     float gradient_unit; /* value of 1 in RowEntry.gradient, 1/m */
     bool wide;
     const uint8_t *entries;      /* RowEntry or RowEntryWide */
+    const int16_t *weights;      /* [entries][SLICE] W_ij in units of W(0) / 32767; 0 in unused places */
     const uint32_t *slice_start; /* first entry of a slice */
     const uint16_t *slice_length;
     const Float4 *position;
@@ -119,6 +120,7 @@ typedef struct SearchJob {
     float volume;
     bool wide;
     uint8_t *entries;
+    int16_t *weights;
     uint32_t *slice_start;
     uint16_t *slice_length;
     float *density;
@@ -140,6 +142,13 @@ typedef struct BoundaryJob {
     uint16_t *neighbours;
 } BoundaryJob;
 
+typedef struct AccelerateJob {
+    const float *p;
+    const Float4 *base;
+    float scale;
+    Float4 *result;
+} AccelerateJob;
+
 typedef struct ForceJob {
     const PairData *pairs;
     const Float4 *velocity; /* in */
@@ -156,8 +165,9 @@ typedef struct Passes {
     /* Boundary terms of a block's particles; contacts go to scratch->contacts. Returns how many, or -1 with
      * *fault. */
     int (*boundary)(const BoundaryJob *job, uint32_t block, Scratch *scratch, uint32_t *fault);
-    /* result_i = (D^T p)_i = p_i G_i + sum_j p_j V grad W_ij */
-    void (*accelerate)(const PairData *pairs, const float *p, Float4 *result, uint32_t block);
+    /* result_i = base_i + scale (D^T p)_i, (D^T p)_i = p_i G_i + sum_j p_j V grad W_ij. base NULL: 0; base
+     * may be result. */
+    void (*accelerate)(const PairData *pairs, const AccelerateJob *job, uint32_t block);
     /* result_i = (D v)_i = v_i . G_i - sum_j v_j . V grad W_ij; contacts with moving bodies are the caller's
      */
     void (*divergence)(const PairData *pairs, const Float4 *v, float *result, uint32_t block);

@@ -35,6 +35,8 @@ static bool rows_reserve(Rows *rows, const Particles *particles, int threads, Er
         rows->pool_entries = (uint32_t)(slices * 45) + CHUNK_ENTRIES * (uint32_t)threads;
     return buffer_reserve(&rows->pool, "neighbour rows", rows->pool_entries * rows_entry_size(rows->wide),
                           err) &&
+           buffer_reserve(&rows->weights, "neighbour weights",
+                          (size_t)rows->pool_entries * SLICE * sizeof(int16_t), err) &&
            buffer_reserve(&rows->slice_start, "row starts", slices * sizeof(uint32_t), err) &&
            buffer_reserve(&rows->slice_length, "row lengths", slices * sizeof(uint16_t), err) &&
            buffer_reserve(&rows->density, "density", padded * sizeof(float), err) &&
@@ -78,6 +80,7 @@ bool rows_build(Rows *rows, const Passes *passes, const Grid *grid, const Partic
                                .volume = volume,
                                .wide = rows->wide,
                                .entries = rows->pool.data,
+                               .weights = rows->weights.data,
                                .slice_start = rows->slice_start.data,
                                .slice_length = rows->slice_length.data,
                                .density = rows->density.data,
@@ -104,6 +107,7 @@ bool rows_build(Rows *rows, const Passes *passes, const Grid *grid, const Partic
                                      .gradient_unit = volume * kernel->gradient_scale / (3.0f * 32767.0f),
                                      .wide = rows->wide,
                                      .entries = job.entries,
+                                     .weights = job.weights,
                                      .slice_start = job.slice_start,
                                      .slice_length = job.slice_length,
                                      .position = job.position,
@@ -116,6 +120,7 @@ bool rows_build(Rows *rows, const Passes *passes, const Grid *grid, const Partic
 
 void rows_free(Rows *rows) {
     buffer_free(&rows->pool);
+    buffer_free(&rows->weights);
     buffer_free(&rows->slice_start);
     buffer_free(&rows->slice_length);
     buffer_free(&rows->density);

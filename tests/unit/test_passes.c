@@ -85,8 +85,9 @@ static void test_against_all_pairs(void **state) {
     static Float4 acceleration[COUNT + BLOCK];
     static float divergence[COUNT + BLOCK];
     const PairData *pairs = &cloud.rows.pairs;
+    const AccelerateJob job = {.p = cloud.particles.pressure, .scale = 1.0f, .result = acceleration};
     for (uint32_t block = 0; block < particles_blocks(&cloud.particles); block++) {
-        passes_plain.accelerate(pairs, cloud.particles.pressure, acceleration, block);
+        passes_plain.accelerate(pairs, &job, block);
         passes_plain.divergence(pairs, (const Float4 *)cloud.particles.velocity, divergence, block);
     }
     double gradient_norm = 0.0;
@@ -132,8 +133,9 @@ static void test_adjoint(void **state) {
     cloud_make(&cloud, &passes_plain, false);
     static Float4 acceleration[COUNT + BLOCK];
     static float divergence[COUNT + BLOCK];
+    const AccelerateJob job = {.p = cloud.particles.pressure, .scale = 1.0f, .result = acceleration};
     for (uint32_t block = 0; block < particles_blocks(&cloud.particles); block++) {
-        passes_plain.accelerate(&cloud.rows.pairs, cloud.particles.pressure, acceleration, block);
+        passes_plain.accelerate(&cloud.rows.pairs, &job, block);
         passes_plain.divergence(&cloud.rows.pairs, (const Float4 *)cloud.particles.velocity, divergence,
                                 block);
     }
@@ -169,8 +171,12 @@ static uint64_t all_bits(const Passes *passes, bool wide) {
                           .result = velocity,
                           .gravity_dt = {0, -0.03f, 0},
                           .viscosity = 0.02f};
+    const AccelerateJob push = {.p = cloud.particles.pressure,
+                                .base = (const Float4 *)cloud.particles.velocity,
+                                .scale = -3.0f,
+                                .result = acceleration};
     for (uint32_t block = 0; block < particles_blocks(&cloud.particles); block++) {
-        passes->accelerate(&cloud.rows.pairs, cloud.particles.pressure, acceleration, block);
+        passes->accelerate(&cloud.rows.pairs, &push, block);
         passes->divergence(&cloud.rows.pairs, (const Float4 *)cloud.particles.velocity, divergence, block);
         passes->forces(&job, block);
     }
