@@ -12,10 +12,11 @@
 typedef struct BoundarySamples {
     uint32_t count, capacity;
     float (*position)[3];
-    float *volume;      /* psi, m^3 */
-    float *area;        /* m^2 */
-    float (*normal)[3]; /* unit, outward of the mesh */
-    int32_t *object;    /* 0: tank; 1 + i: body i */
+    float *volume;       /* psi, m^3 */
+    float *area;         /* m^2 */
+    float (*normal)[3];  /* unit, outward of the mesh */
+    float (*surface)[3]; /* the point of the true surface it stands for */
+    int32_t *object;     /* 0: tank; 1 + i: body i */
 } BoundarySamples;
 
 typedef struct BoundarySet {
@@ -36,9 +37,19 @@ typedef struct Boundary {
     Buffer contact_buffer, span_buffer, centre_buffer, partial_buffer;
 } Boundary;
 
-/* Samples a mesh as it lies, with spacing in m. region NULL: all of it. */
-bool boundary_add(BoundarySet *set, const Mesh *mesh, int32_t object, float spacing,
-                  const SampleRegion *region, const char *path, Err *err);
+/* How a surface is sampled. */
+typedef struct SurfaceDef {
+    const Mesh *mesh; /* with its tree */
+    int32_t object;
+    float spacing;              /* m */
+    float offset;               /* m, how far behind the surface, seen from the water, the samples lie */
+    bool water_inside;          /* a tank; else a body */
+    const SampleRegion *region; /* NULL: all of it */
+    const char *path;           /* for messages */
+} SurfaceDef;
+
+/* Samples a surface as it lies. */
+bool boundary_add(BoundarySet *set, const SurfaceDef *surface, Err *err);
 /* Volumes psi = 1 / sum W over the set's own samples, as they lie in their frame; then sorts them there. A
  * body is weighed alone, so that a wall it starts beside does not thin it; all that is fixed is weighed
  * together. */

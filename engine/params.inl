@@ -25,6 +25,7 @@ PARAM_INT(max_iterations, "maxIterations", 100, 1, 10000, "", "Most iterations o
 PARAM_INT(min_divergence_iterations, "minIterationsV", 3, 1, 1000, "", "Fewest iterations of the divergence solve")
 PARAM_INT(max_divergence_iterations, "maxIterationsV", 100, 1, 10000, "", "Most iterations of the divergence solve")
 PARAM_FLOAT(boundary_spacing, "boundarySpacing", 1.0f, 0.5f, 2.0f, "r", "Mean distance of boundary samples")
+PARAM_FLOAT(boundary_offset, "boundaryOffset", 1.15f, 0.0f, 2.0f, "r", "How far behind the true surface of walls and bodies their samples lie: water keeps this distance from samples; 0 as the papers")
 PARAM_ENUM(escape, "escape", 0, "error|remove", "What happens to a particle that leaves the domain: stop, or remove it and count it")
 PARAM_FLOAT(speed_limit, "speedLimit", 100.0f, 0.1f, 1e6f, "m/s", "A faster particle stops the run as diverged")
 PARAM_FLOAT(density_limit, "densityLimit", 3.0f, 1.01f, 100.0f, "density0", "A denser particle stops the run as diverged")

@@ -36,11 +36,11 @@ static bool probe_object(const SkiffSim *sim, const SkiffProbeDef *def, const ch
     return *object >= 0 || err_add(err, ERR_INPUT, "%s.object: no body is named '%s'", path, def->object);
 }
 
-/* World position at the start and normal of a sample. */
+/* World position at the start of the surface point a sample stands for. */
 static void sample_place(const SkiffSim *sim, const BoundarySet *set, bool moving, uint32_t s,
                          double position[3]) {
     for (int k = 0; k < 3; k++)
-        position[k] = (double)set->samples.position[s][k] +
+        position[k] = (double)set->samples.surface[s][k] +
                       (moving ? sim->bodies[set->samples.object[s] - 1].position[k] : sim->origin[k]);
 }
 
@@ -278,13 +278,11 @@ static void part_force(const SkiffSim *sim, const BoundarySet *set, const uint8_
 }
 
 static void read_part_force(const SkiffSim *sim, const Probe *probe, double force[6]) {
-    const double dt = sim->params.time_step;
-    const double scale = (double)sim->volume * (double)sim->params.rest_density / (dt * dt);
-    const float *total = sim->total_pressure.data;
+    const float *pressure = sim->pressure.data;
     const Particles *particles = &sim->particles;
     const float *centre = sim->boundary.centres[probe->object > 0 ? probe->object : 0];
     for (uint32_t i = 0; sim->step > 0 && i < particles->count; i++) {
-        if (total[i] == 0.0f)
+        if (pressure[i] == 0.0f)
             continue;
         float p[3]; /* where the pressure acted: before the step's motion */
         for (int k = 0; k < 3; k++)
@@ -292,7 +290,7 @@ static void read_part_force(const SkiffSim *sim, const Probe *probe, double forc
         for (int m = 0; m < 2; m++) {
             const BoundarySet *set = m ? &sim->boundary.moving : &sim->boundary.fixed;
             if (set->sorted.count != 0)
-                part_force(sim, set, probe->chosen[m], p, scale * (double)total[i], centre, force);
+                part_force(sim, set, probe->chosen[m], p, (double)(sim->volume * pressure[i]), centre, force);
         }
     }
 }

@@ -155,7 +155,13 @@ static bool make_tank(SkiffSim *sim, const SkiffDef *def, Err *err) {
     if (region.max[1] <= mesh->min[1])
         return err_add(err, ERR_INPUT, "Tank.wetHeight: %g m is below the tank's floor at %g m",
                        (double)tank->wet_height, (double)mesh->min[1] + sim->origin[1]);
-    return boundary_add(&sim->boundary.fixed, mesh, 0, spacing, &region, "Tank", err);
+    const SurfaceDef surface = {.mesh = mesh,
+                                .spacing = spacing,
+                                .offset = def->params.boundary_offset * def->params.particle_radius,
+                                .water_inside = true,
+                                .region = &region,
+                                .path = "Tank"};
+    return boundary_add(&sim->boundary.fixed, &surface, err);
 }
 
 static bool make_body(SkiffSim *sim, const SkiffDef *def, int index, Err *err) {
@@ -169,13 +175,18 @@ static bool make_body(SkiffSim *sim, const SkiffDef *def, int index, Err *err) {
             return err_add(err, ERR_INPUT, "%s.name: '%s' is also the name of RigidBodies[%d]", path,
                            body->name, other);
     BoundarySet own = {0};
-    const float spacing = def->params.boundary_spacing * def->params.particle_radius;
-    Mesh placed = body->mesh;
-    bool good = boundary_add(&own, &placed, 1 + index, spacing, NULL, path, err);
+    const SurfaceDef surface = {.mesh = &body->mesh,
+                                .object = 1 + index,
+                                .spacing = def->params.boundary_spacing * def->params.particle_radius,
+                                .offset = def->params.boundary_offset * def->params.particle_radius,
+                                .path = path};
+    bool good = boundary_add(&own, &surface, err);
     if (good && body->fixed) /* fixed samples live in the window's frame */
         for (uint32_t s = 0; s < own.samples.count; s++)
-            for (int k = 0; k < 3; k++)
+            for (int k = 0; k < 3; k++) {
                 own.samples.position[s][k] += (float)(body->position[k] - sim->origin[k]);
+                own.samples.surface[s][k] += (float)(body->position[k] - sim->origin[k]);
+            }
     good = good && (body->fixed || boundary_weigh(&own, &sim->kernel, err)) &&
            boundary_append(body->fixed ? &sim->boundary.fixed : &sim->boundary.moving, &own.samples, err);
     boundary_set_free(&own);
@@ -325,7 +336,7 @@ static bool reserve_step_memory(SkiffSim *sim, uint32_t capacity, Err *err) {
     return particles_reserve(&sim->particles, capacity, err) &&
            boundary_reserve(&sim->boundary, capacity, sim->body_count, err) &&
            dfsph_reserve(&sim->dfsph, capacity, 1 + (uint32_t)sim->body_count, err) &&
-           buffer_reserve(&sim->total_pressure, "total pressure", padded * sizeof(float), err) &&
+           buffer_reserve(&sim->pressure, "pressure", padded * sizeof(float), err) &&
            buffer_reserve(&sim->object_forces, "object forces",
                           (1 + (size_t)sim->body_count) * 6 * sizeof(double), err) &&
            buffer_reserve(&sim->sums, "statistics", (padded / BLOCK + 1) * 128, err);
@@ -399,7 +410,7 @@ void skiff_destroy(SkiffSim *sim) {
     rows_free(&sim->rows);
     boundary_free(&sim->boundary);
     dfsph_free(&sim->dfsph);
-    buffer_free(&sim->total_pressure);
+    buffer_free(&sim->pressure);
     buffer_free(&sim->object_forces);
     buffer_free(&sim->sums);
     free(sim);

@@ -53,9 +53,9 @@ struct SkiffSim {
 
     /* solves */
     Dfsph dfsph;
-    Buffer total_pressure; /* [particles] sum of both pressures, m^2, of the last step */
-    Buffer object_forces;  /* [objects][6] force (N) and torque about the object's centre (N m) of the last
-                              step */
+    Buffer pressure;      /* [particles] Pa, of both solves of the last step */
+    Buffer object_forces; /* [objects][6] force (N) and torque about the object's centre (N m) of the last
+                             step */
 
     /* advance */
     Buffer sums; /* [blocks] partial sums of the statistics */

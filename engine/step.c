@@ -71,20 +71,19 @@ static void solve_density(SkiffSim *sim) {
     sim->stats.residual_percent = 100.0 * result.residual;
 }
 
-/* Forces of the fluid on tank and bodies during this step, from the pressures of both solves. */
+/* Pressure of this step, of both solves together, and the forces of the fluid on tank and bodies. */
 static void measure_forces(SkiffSim *sim) {
-    float *total = sim->total_pressure.data;
+    float *total = sim->pressure.data;
     const Particles *particles = &sim->particles;
+    const float unit = sim->params.rest_density / (sim->params.time_step * sim->params.time_step);
 #pragma omp parallel for schedule(static) num_threads(sim->threads)
     for (uint32_t i = 0; i < particles->count; i++)
-        total[i] = particles->pressure[i] + particles->pressure_divergence[i];
+        total[i] = unit * (particles->pressure[i] + particles->pressure_divergence[i]);
     double(*forces)[6] = sim->object_forces.data;
     boundary_impulse(&sim->boundary, total, particles_blocks(particles), forces, sim->threads);
-    const double dt = sim->params.time_step;
-    const double scale = (double)sim->volume * (double)sim->params.rest_density / (dt * dt);
     for (uint32_t o = 0; o < sim->boundary.object_count; o++)
         for (int k = 0; k < 6; k++)
-            forces[o][k] *= scale;
+            forces[o][k] *= (double)sim->volume; /* p V grad W */
 }
 
 static AdvanceSums advance_block(SkiffSim *sim, uint32_t block) {

@@ -34,7 +34,7 @@ SkiffParticles skiff_particles(const SkiffSim *sim) {
                            .position = (const float(*)[4])particles->position,
                            .velocity = (const float(*)[4])particles->velocity,
                            .density = sim->rows.density.data,
-                           .pressure = sim->total_pressure.data,
+                           .pressure = sim->pressure.data,
                            .id = particles->id,
                            .birth = particles->birth};
     memcpy(view.origin, sim->origin, sizeof view.origin);
@@ -120,6 +120,5 @@ uint64_t skiff_memory(const SkiffSim *sim) {
     }
     total += sim->boundary.contact_buffer.size + sim->boundary.span_buffer.size +
              sim->boundary.centre_buffer.size + sim->boundary.partial_buffer.size;
-    return total + sim->dfsph.buffer.size + sim->total_pressure.size + sim->object_forces.size +
-           sim->sums.size;
+    return total + sim->dfsph.buffer.size + sim->pressure.size + sim->object_forces.size + sim->sums.size;
 }

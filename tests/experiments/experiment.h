@@ -221,10 +221,11 @@ static inline void experiment_tank(SkiffDef *def, float x, float y, float z) {
     def->tank.open = true;
 }
 
-/* Water keeps this far from walls and bodies, in particle radii. Measured: a lattice of rest density
- * (volumeFactor 1) whose cells end 1.2 r from the walls starts with every density within 0.3 % of rest;
- * at 1.0 r the corners start 15 % too dense, at 0 they explode. */
-#define EXPERIMENT_GAP 1.2f
+/* Water keeps this far from the true surface of walls and bodies, in particle radii: 1.2 from their samples,
+ * which lie 1.15 behind it (boundaryOffset). A lattice of rest density (volumeFactor 1) whose cells end 1.2 r
+ * from the samples starts with every density within 0.3 % of rest; at 1.0 r the corners start 15 % too dense,
+ * at 0 they explode. */
+#define EXPERIMENT_GAP 0.05f
 
 /* nx x ny x nz particles on the lattice, in the middle of the tank and a gap above its floor. */
 static inline SkiffBlockDef experiment_block(const SkiffDef *def, int nx, int ny, int nz) {

@@ -208,8 +208,9 @@ static void test_flat_wall(void **state) {
         scene.block.start[1] = y - 0.02f;
         scene.block.end[1] = y + 0.02f;
         scene.def.params.gravity[1] = 0.0f;
-        scene.def.params.speed_limit =
-            1e6f; /* alone inside a wall it is shot out: only its density is of interest */
+        scene.def.params.boundary_offset = 0.0f;
+        /* alone inside a wall it is shot out: only its density is of interest */
+        scene.def.params.speed_limit = 1e6f;
         SkiffSim *sim = accept(&scene);
         assert_int_equal(skiff_particles(sim).count, 1);
         Err err = {0};
@@ -269,8 +270,8 @@ static void test_carving(void **state) {
     for (int k = 0; k < 100; k++) {
         assert_true(skiff_step(sim, &err));
         const SkiffBody body = skiff_body(sim, 0);
-        assert_true(fabs(body.velocity[1]) <
-                    1.0); /* the water's own fall is 1 m/s; unharmed by overlap it is not faster */
+        /* the water itself falls at 1 m/s; thrown out by an overlap a body would be ten times as fast */
+        assert_true(fabs(body.velocity[1]) < 2.0);
         assert_in_range((int)(1e3 * body.position[1]), 150, 350);
     }
     skiff_destroy(sim);
