@@ -29,22 +29,78 @@ static bool samples_grow(BoundarySamples *samples, uint32_t extra) {
     return true;
 }
 
-/* Moves a sample behind the surface. A body thinner than two offsets gets as much as leaves the sample well
- * inside: its two sides would trade places. */
-static void shift_sample(const SurfaceDef *surface, const SamplePoint *point, float position[3]) {
-    const float sign = surface->water_inside ? 1.0f : -1.0f;
-    memcpy(position, point->position, 3 * sizeof(float));
-    for (float share = 1.0f; share > 0.1f && surface->offset > 0.0f; share *= 0.5f) {
-        const float distance = share * surface->offset;
-        float q[3];
-        for (int k = 0; k < 3; k++)
-            q[k] = point->position[k] + sign * distance * point->normal[k];
-        /* on an edge the normal is a mean, and the faces are 0.7 of the way off; in a corner 0.58 */
-        if (!surface->water_inside && mesh_distance(surface->mesh, q, NULL) > -0.5f * distance)
-            continue;
-        memcpy(position, q, sizeof q);
-        return;
+/* Displacements that move every face of the mesh by one unit along its normal: a vertex between faces goes
+ * where their moved planes meet (least squares over its triangles, weighted by area; the small regular part
+ * decides along directions no face speaks of). */
+static void offset_directions(const Mesh *mesh, double (*normal_sums)[3], double (*tensors)[6]) {
+    for (uint32_t t = 0; t < mesh->triangle_count; t++) {
+        double edge[2][3], n[3];
+        for (int k = 0; k < 3; k++) {
+            const double origin = (double)mesh->vertices[mesh->triangles[t][0]][k];
+            edge[0][k] = (double)mesh->vertices[mesh->triangles[t][1]][k] - origin;
+            edge[1][k] = (double)mesh->vertices[mesh->triangles[t][2]][k] - origin;
+        }
+        cross_product(edge[0], edge[1], n);
+        const double area = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+        for (int c = 0; c < 3; c++) {
+            double *sum = normal_sums[mesh->triangles[t][c]], *tensor = tensors[mesh->triangles[t][c]];
+            for (int k = 0; k < 3; k++)
+                sum[k] += n[k];
+            tensor[0] += n[0] * n[0] / area;
+            tensor[1] += n[0] * n[1] / area;
+            tensor[2] += n[0] * n[2] / area;
+            tensor[3] += n[1] * n[1] / area;
+            tensor[4] += n[1] * n[2] / area;
+            tensor[5] += n[2] * n[2] / area;
+        }
     }
+    for (uint32_t v = 0; v < mesh->vertex_count; v++) {
+        const double *m = tensors[v], small = 1e-3 * (m[0] + m[3] + m[5]);
+        const double a = m[0] + small, b = m[1], c = m[2], d = m[3] + small, e = m[4], f = m[5] + small;
+        const double inverse[3][3] = {{d * f - e * e, c * e - b * f, b * e - c * d},
+                                      {c * e - b * f, a * f - c * c, b * c - a * e},
+                                      {b * e - c * d, b * c - a * e, a * d - b * b}};
+        const double det = a * inverse[0][0] + b * inverse[0][1] + c * inverse[0][2];
+        matrix_times(inverse, normal_sums[v], normal_sums[v]);
+        for (int k = 0; k < 3; k++)
+            normal_sums[v][k] /= det;
+    }
+}
+
+/* The mesh with its faces moved behind the surface, seen from the water. A body thinner than two offsets gets
+ * a part of it: its sides would trade places. */
+static bool offset_mesh(const SurfaceDef *surface, Mesh *moved, Err *err) {
+    const Mesh *mesh = surface->mesh;
+    double(*directions)[3] = calloc(mesh->vertex_count, sizeof *directions);
+    double(*tensors)[6] = calloc(mesh->vertex_count, sizeof *tensors);
+    *moved = (Mesh){.vertices = malloc(mesh->vertex_count * sizeof *moved->vertices),
+                    .triangles = malloc(mesh->triangle_count * sizeof *moved->triangles),
+                    .vertex_count = mesh->vertex_count,
+                    .triangle_count = mesh->triangle_count};
+    const bool memory = directions && tensors && moved->vertices && moved->triangles;
+    if (memory) {
+        offset_directions(mesh, directions, tensors);
+        memcpy(moved->triangles, mesh->triangles, mesh->triangle_count * sizeof *moved->triangles);
+    }
+    bool good = false;
+    for (float share = 1.0f; memory && !good; share = share > 0.1f ? 0.5f * share : 0.0f) {
+        const float distance = share * surface->offset, sign = surface->water_inside ? 1.0f : -1.0f;
+        good = true;
+        for (uint32_t v = 0; v < mesh->vertex_count; v++) {
+            for (int k = 0; k < 3; k++)
+                moved->vertices[v][k] = mesh->vertices[v][k] + sign * distance * (float)directions[v][k];
+            good = good && (surface->water_inside || share == 0.0f ||
+                            mesh_distance(mesh, moved->vertices[v], NULL) < -0.5f * distance);
+        }
+    }
+    free(directions);
+    free(tensors);
+    if (!memory) {
+        mesh_free(moved);
+        return err_add(err, ERR_INPUT, "%s: no memory", surface->path);
+    }
+    mesh_transform(moved, (const float[3]){1, 1, 1}, (const float[4]){0, 0, 0, 1}, (const float[3]){0, 0, 0});
+    return true;
 }
 
 bool boundary_add(BoundarySet *set, const SurfaceDef *surface, Err *err) {
@@ -52,8 +108,13 @@ bool boundary_add(BoundarySet *set, const SurfaceDef *surface, Err *err) {
     SamplePoint *points = NULL;
     uint32_t count = 0;
     Err reason = {0};
-    if (!sample_surface(surface->mesh, surface->spacing, surface->region, MAX_SAMPLES, &points, &count,
-                        &reason))
+    Mesh moved;
+    if (!offset_mesh(surface, &moved, err))
+        return false;
+    const bool sampled =
+        sample_surface(&moved, surface->spacing, surface->region, MAX_SAMPLES, &points, &count, &reason);
+    mesh_free(&moved);
+    if (!sampled)
         return err_add(err, reason.code, "%s: %s", surface->path, reason.message);
     BoundarySamples *samples = &set->samples;
     if (!samples_grow(samples, count)) {
@@ -62,8 +123,10 @@ bool boundary_add(BoundarySet *set, const SurfaceDef *surface, Err *err) {
     }
     for (uint32_t s = 0; s < count; s++) {
         const uint32_t to = samples->count++;
-        shift_sample(surface, &points[s], samples->position[to]);
-        memcpy(samples->surface[to], points[s].position, sizeof samples->surface[to]);
+        const float back = surface->water_inside ? -surface->offset : surface->offset;
+        memcpy(samples->position[to], points[s].position, sizeof samples->position[to]);
+        for (int k = 0; k < 3; k++)
+            samples->surface[to][k] = points[s].position[k] + back * points[s].normal[k];
         memcpy(samples->normal[to], points[s].normal, sizeof samples->normal[to]);
         samples->area[to] = points[s].area;
         samples->object[to] = surface->object;

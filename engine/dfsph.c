@@ -30,7 +30,7 @@ static const double SAFETY = 0.4;
 
 bool dfsph_reserve(Dfsph *dfsph, uint32_t particle_capacity, uint32_t object_count, Err *err) {
     const size_t padded = particle_capacity + BLOCK, blocks = padded / BLOCK;
-    const size_t bytes = padded * (2 * sizeof(Float4) + 6 * sizeof(float)) +
+    const size_t bytes = padded * (2 * sizeof(Float4) + 7 * sizeof(float)) +
                          blocks * DFSPH_SUMS * sizeof(double) + (size_t)object_count * 12 * sizeof(double);
     if (!buffer_reserve(&dfsph->buffer, "pressure solver", bytes, err))
         return false;
@@ -49,6 +49,7 @@ bool dfsph_reserve(Dfsph *dfsph, uint32_t particle_capacity, uint32_t object_cou
     TAKE(image, padded);
     TAKE(new_image, padded);
     TAKE(inv_diagonal, padded);
+    TAKE(source, padded);
 #undef TAKE
     return true;
 }
@@ -175,15 +176,13 @@ static inline void precondition_lanes(const float *residual, const float *p, con
 }
 
 /* residual = source + dt D (v - D^T p / dt), and what follows from it. One application of A. */
-static Errors evaluate_residual(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, const float *p) {
+static Errors evaluate_residual(Dfsph *dfsph, const DfsphProblem *problem, const float *p) {
     const uint32_t blocks = particles_blocks(problem->particles);
     apply_pressure(dfsph, problem, p, dfsph->guess);
     double(*velocities)[6] = dfsph->impulses; /* no longer needed */
     if (dfsph->moving)
         body_velocities(dfsph, problem, velocities);
     const float dt = problem->params->time_step;
-    const float gamma = problem->params->softening;
-    const float *density = problem->rows->pairs.density;
     float *residual = dfsph->residual;
     EACH_BLOCK {
         divergence_block(dfsph, problem, (const Float4 *)dfsph->guess, (const double(*)[6])velocities,
@@ -192,11 +191,7 @@ static Errors evaluate_residual(Dfsph *dfsph, const DfsphProblem *problem, Solve
         EACH_SLICE {
             EACH_LANE {
                 const uint32_t i = first + l;
-                const float excess = density[i] - 1.0f;
-                /* where there is room to the rest density, approaching is no fault: thin water falls together
-                 * freely */
-                const float term = kind == SOLVE_DENSITY ? gamma * excess : excess < 0.0f ? excess : 0.0f;
-                const float r = term + dt * residual[i];
+                const float r = dfsph->source[i] + dt * residual[i];
                 residual[i] = dfsph->inv_diagonal[i] > 0.0f ? r : 0.0f;
             }
             error_lanes(residual + first, p + first, &one, &two);
@@ -211,19 +206,50 @@ static Errors evaluate_residual(Dfsph *dfsph, const DfsphProblem *problem, Solve
     return (Errors){totals[0] / problem->particles->count, totals[1] / problem->particles->count};
 }
 
-/* Inverse diagonal, 0 where a particle takes no part; pressure scaled to the warm start. */
+/* What a density solve corrects: a share gamma of the density error, and the error that this step's motion
+ * will add because D v is only the tangent. That is taken to be what the last step's motion added. Without it
+ * a fast flow carries an error of 1 / gamma times a step's. */
+static float density_source(const SkiffParams *params, float density, float prediction) {
+    static const float LARGEST = 0.005f,
+                       DENSE = 0.99f; /* near the surface neighbours come and go: nothing to learn there */
+    float expected = 0.0f;
+    if (prediction > 0.0f && density > DENSE && params->pressure_solver == 0)
+        expected = params->feedforward * (density - prediction);
+    expected = expected > LARGEST ? LARGEST : expected < -LARGEST ? -LARGEST : expected;
+    return params->softening * (density - 1.0f) + expected;
+}
+
+/* Density that the velocities found lead to: rho + dt D v, from the residual that is left. */
+static void predict_density(const Dfsph *dfsph, const DfsphProblem *problem) {
+    const uint32_t blocks = particles_blocks(problem->particles);
+    const float *density = problem->rows->pairs.density;
+    EACH_BLOCK {
+        for (uint32_t i = block * BLOCK; i < (block + 1) * BLOCK; i++)
+            problem->particles->prediction[i] =
+                dfsph->inv_diagonal[i] > 0.0f ? density[i] + dfsph->residual[i] - dfsph->source[i] : 0.0f;
+    }
+}
+
+/* Inverse diagonal, 0 where a particle takes no part; source; pressure scaled to the warm start. */
 static void prepare(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, float *p) {
     const uint32_t blocks = particles_blocks(problem->particles);
     const uint32_t count = problem->particles->count;
     const float warm =
         kind == SOLVE_DENSITY ? problem->params->warm_start : problem->params->warm_start_divergence;
     const Float4 *gradient_sum = problem->rows->pairs.gradient_sum;
+    const float *density = problem->rows->pairs.density;
     EACH_BLOCK {
         for (uint32_t i = block * BLOCK; i < (block + 1) * BLOCK; i++) {
             const bool few = kind == SOLVE_DIVERGENCE && problem->rows->neighbours[i] < MIN_NEIGHBOURS;
             const bool takes_part = i < count && gradient_sum[i][3] > MIN_DIAGONAL && !few;
             dfsph->inv_diagonal[i] = takes_part ? 1.0f / gradient_sum[i][3] : 0.0f;
             p[i] = takes_part && p[i] > 0.0f ? warm * p[i] : 0.0f;
+            /* divergence: where there is room to the rest density, approaching is no fault: thin water falls
+             * together freely */
+            dfsph->source[i] = kind == SOLVE_DENSITY ? density_source(problem->params, density[i],
+                                                                      problem->particles->prediction[i])
+                               : density[i] < 1.0f   ? density[i] - 1.0f
+                                                     : 0.0f;
         }
     }
 }
@@ -304,10 +330,9 @@ typedef struct SolveLimits {
     int min, max;
 } SolveLimits;
 
-static SolveResult solve_gcr(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, float *p,
-                             SolveLimits limits) {
+static SolveResult solve_gcr(Dfsph *dfsph, const DfsphProblem *problem, float *p, SolveLimits limits) {
     const double tolerance = SAFETY * limits.tolerance;
-    Errors errors = evaluate_residual(dfsph, problem, kind, p);
+    Errors errors = evaluate_residual(dfsph, problem, p);
     int iterations = 1;
     bool has_direction = false;
     double cut = 0.0;
@@ -324,7 +349,7 @@ static SolveResult solve_gcr(Dfsph *dfsph, const DfsphProblem *problem, SolveKin
             break; /* the residual has nothing left along any direction */
         if (cut > 0.5 * tolerance && iterations < limits.max) {
             /* the projection moved P without the residual knowing */
-            errors = evaluate_residual(dfsph, problem, kind, p);
+            errors = evaluate_residual(dfsph, problem, p);
             iterations++;
             has_direction = false;
             cut = 0.0;
@@ -335,12 +360,11 @@ static SolveResult solve_gcr(Dfsph *dfsph, const DfsphProblem *problem, SolveKin
 
 /* ---- Relaxed Jacobi ---- */
 
-static SolveResult solve_jacobi(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, float *p,
-                                SolveLimits limits) {
+static SolveResult solve_jacobi(Dfsph *dfsph, const DfsphProblem *problem, float *p, SolveLimits limits) {
     const uint32_t blocks = particles_blocks(problem->particles);
     const float relaxation = problem->params->jacobi_relaxation;
     for (int iterations = 1;; iterations++) {
-        const Errors errors = evaluate_residual(dfsph, problem, kind, p);
+        const Errors errors = evaluate_residual(dfsph, problem, p);
         EACH_BLOCK {
             const uint32_t end = (block + 1) * BLOCK;
             for (uint32_t i = block * BLOCK; i < end; i++) {
@@ -368,8 +392,10 @@ SolveResult dfsph_solve(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kin
                             params->max_divergence_iterations};
     dfsph->moving = problem->boundary->moving.samples.count != 0;
     prepare(dfsph, problem, kind, p);
-    const SolveResult result = params->pressure_solver == 0 ? solve_gcr(dfsph, problem, kind, p, limits)
-                                                            : solve_jacobi(dfsph, problem, kind, p, limits);
+    const SolveResult result = params->pressure_solver == 0 ? solve_gcr(dfsph, problem, p, limits)
+                                                            : solve_jacobi(dfsph, problem, p, limits);
+    if (kind == SOLVE_DENSITY)
+        predict_density(dfsph, problem);
     apply_pressure(dfsph, problem, p, problem->particles->velocity);
     if (dfsph->moving) {
         const double scale = 1.0 / (double)params->time_step;

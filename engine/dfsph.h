@@ -17,6 +17,7 @@ typedef struct Dfsph {
     Float4 *acceleration; /* D^T p */
     Float4 *guess;        /* velocity after the pressure so far */
     float *residual, *preconditioned, *direction, *image, *new_image, *inv_diagonal;
+    float *source;          /* what stands beside dt D v: relative density */
     double *partials;       /* [blocks][DFSPH_SUMS] */
     double (*impulses)[6];  /* [objects] sums of boundary_impulse */
     double (*responses)[6]; /* [objects] a body's answer: (D^T p) of its six velocities */

@@ -93,7 +93,7 @@ uint32_t particles_append(Particles *particles, const float position[3], const f
         particles->velocity[i][k] = velocity[k];
     }
     particles->position[i][3] = particles->velocity[i][3] = 0.0f;
-    particles->pressure[i] = particles->pressure_divergence[i] = 0.0f;
+    particles->pressure[i] = particles->pressure_divergence[i] = particles->prediction[i] = 0.0f;
     particles->id[i] = particles->next_id++;
     particles->birth[i] = birth;
     return i;

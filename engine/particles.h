@@ -22,6 +22,7 @@ typedef struct Particles {
     Float4 *velocity;
     float *pressure;
     float *pressure_divergence;
+    float *prediction;
     uint64_t *id;
     double *birth;
     Buffer front[PARTICLE_FIELD_COUNT], back[PARTICLE_FIELD_COUNT];

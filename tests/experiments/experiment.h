@@ -202,8 +202,18 @@ static inline double experiment_curve_at(const ExperimentCurve *curve, double x)
 
 /* ---- Defs ---- */
 
+/* Water keeps 1.2 r from the samples of walls and bodies, which lie EXPERIMENT_OFFSET r behind the true
+ * surface (boundaryOffset; a program may define it before this header). A lattice of rest density
+ * (volumeFactor 1) whose cells end 1.2 r from the samples starts with every density within 0.3 % of rest;
+ * at 1.0 r the corners start 15 % too dense, at 0 they explode. */
+#ifndef EXPERIMENT_OFFSET
+#define EXPERIMENT_OFFSET 0.0f
+#endif
+#define EXPERIMENT_GAP (1.2f - EXPERIMENT_OFFSET)
+
 static inline SkiffDef experiment_def(const Experiment *experiment, float radius, float dt) {
     SkiffDef def = skiff_def_default();
+    def.params.boundary_offset = EXPERIMENT_OFFSET;
     def.threads = experiment->threads;
     def.params.particle_radius = radius;
     def.params.time_step = dt;
@@ -220,12 +230,6 @@ static inline void experiment_tank(SkiffDef *def, float x, float y, float z) {
     }
     def->tank.open = true;
 }
-
-/* Water keeps this far from the true surface of walls and bodies, in particle radii: 1.2 from their samples,
- * which lie 1.15 behind it (boundaryOffset). A lattice of rest density (volumeFactor 1) whose cells end 1.2 r
- * from the samples starts with every density within 0.3 % of rest; at 1.0 r the corners start 15 % too dense,
- * at 0 they explode. */
-#define EXPERIMENT_GAP 0.05f
 
 /* nx x ny x nz particles on the lattice, in the middle of the tank and a gap above its floor. */
 static inline SkiffBlockDef experiment_block(const SkiffDef *def, int nx, int ny, int nz) {

@@ -11,6 +11,7 @@
  * draft at which the hull grown by EXPERIMENT_GAP r on every side (bottom and sides) displaces its weight
  * is the "effective" one, and the layer that would explain the measured draft exactly is given in r. The
  * judgement is on the geometric draft. */
+#define EXPERIMENT_OFFSET 1.15f /* bodies displace what they are, not a layer of water more */
 #include "experiment.h"
 
 static const float box_size[3] = {0.5f, 0.4f, 0.5f};

@@ -13,6 +13,7 @@
  * The balance: water keeps EXPERIMENT_GAP r from the hull, so it is a sphere of a + 1.2 r that displaces,
  * and it floats higher than its centre. The hold is computed with that layer; the motion is measured about
  * the balance found from its own extremes. */
+#define EXPERIMENT_OFFSET 1.15f /* bodies displace what they are, not a layer of water more */
 #include "experiment.h"
 
 enum { MAX_STEPS = 2000 };
