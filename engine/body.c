@@ -13,11 +13,6 @@ void matrix_times(const double m[3][3], const double v[3], double result[3]) {
     memcpy(result, r, sizeof r);
 }
 
-void cross_product(const double a[3], const double b[3], double result[3]) {
-    const double r[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-    memcpy(result, r, sizeof r);
-}
-
 static void quaternion_matrix(const double q[4], double m[3][3]) {
     const double x = q[0], y = q[1], z = q[2], w = q[3];
     const double r[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)},

@@ -49,6 +49,5 @@ void body_advance(Body *body, double time, double dt);
 bool body_held(const Body *body, double time);
 
 void matrix_times(const double m[3][3], const double v[3], double result[3]);
-void cross_product(const double a[3], const double b[3], double result[3]);
 
 #endif

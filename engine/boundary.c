@@ -2,6 +2,7 @@
  * them. Samples are not visited again after boundary_apply: the solvers work with the contacts [DESIGN sec.
  * 4]. */
 #include "boundary.h"
+#include "dvec.h"
 
 #include <math.h>
 #include <omp.h>
@@ -40,7 +41,7 @@ static void offset_directions(const Mesh *mesh, double (*normal_sums)[3], double
             edge[0][k] = (double)mesh->vertices[mesh->triangles[t][1]][k] - origin;
             edge[1][k] = (double)mesh->vertices[mesh->triangles[t][2]][k] - origin;
         }
-        cross_product(edge[0], edge[1], n);
+        dvec_cross(n, edge[0], edge[1]);
         const double area = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
         for (int c = 0; c < 3; c++) {
             double *sum = normal_sums[mesh->triangles[t][c]], *tensor = tensors[mesh->triangles[t][c]];

@@ -1,4 +1,4 @@
-/* Double-precision three-vectors for set-up geometry: meshes, their integrals and samples. (The vectors of
+/* Double-precision three-vectors: meshes, their integrals and samples, rigid bodies. (The vectors of
  * cglm are float32, which loses the last digits that areas, volumes and the sides of a face are decided by.)
  */
 #ifndef SKIFF_DVEC_H

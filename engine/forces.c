@@ -3,6 +3,7 @@
  * psi_b W_ib  of its velocity relative to the object, and the object gets the momentum. The sum is part of
  * every contact, so friction visits no sample. */
 #include "sim.h"
+#include "dvec.h"
 
 /* Velocity of an object where a particle is. */
 static void object_velocity(const SkiffSim *sim, uint32_t object, const float *position, double v[3]) {
@@ -13,7 +14,7 @@ static void object_velocity(const SkiffSim *sim, uint32_t object, const float *p
     double arm[3];
     for (int k = 0; k < 3; k++)
         arm[k] = (double)position[k] - (double)sim->boundary.centres[object][k];
-    cross_product(body->angular_velocity, arm, v);
+    dvec_cross(v, body->angular_velocity, arm);
     for (int k = 0; k < 3; k++)
         v[k] += body->velocity[k];
 }
@@ -37,7 +38,7 @@ static void friction_block(SkiffSim *sim, uint32_t block, double (*lost)[6]) {
             velocity[k] -= (float)change[k];
             arm[k] = (double)position[k] - (double)boundary->centres[contact->object][k];
         }
-        cross_product(arm, change, moment);
+        dvec_cross(moment, arm, change);
         for (int k = 0; k < 3; k++) {
             lost[contact->object][k] += change[k];
             lost[contact->object][3 + k] += moment[k];

@@ -5,6 +5,7 @@
  * the fluid really exerts (momentum balance), without the bias that averaging over particles on one side of a
  * wall has. */
 #include "sim.h"
+#include "dvec.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -268,7 +269,7 @@ static void part_force(const SkiffSim *sim, const BoundarySet *set, const uint8_
             const double arm[3] = {at[0] - (double)centre[0], at[1] - (double)centre[1],
                                    at[2] - (double)centre[2]};
             double t[3];
-            cross_product(arm, f, t);
+            dvec_cross(t, arm, f);
             for (int k = 0; k < 3; k++) {
                 force[k] += f[k];
                 force[3 + k] += t[k];
@@ -298,7 +299,7 @@ static void read_part_force(const SkiffSim *sim, const Probe *probe, double forc
 /* Torque about the window's origin, where the tank's is measured, to about the world's. */
 static void shift_torque(const SkiffSim *sim, double force[6]) {
     double turn[3];
-    cross_product(sim->origin, force, turn);
+    dvec_cross(turn, sim->origin, force);
     for (int k = 0; k < 3; k++)
         force[3 + k] += turn[k];
 }
