@@ -209,11 +209,15 @@ static Errors evaluate_residual(Dfsph *dfsph, const DfsphProblem *problem, const
 /* What a density solve corrects: a share gamma of the density error, and the error that this step's motion
  * will add because D v is only the tangent. That is taken to be what the last step's motion added. Without it
  * a fast flow carries an error of 1 / gamma times a step's. */
-static float density_source(const SkiffParams *params, float density, float prediction) {
+static float density_source(const SkiffParams *params, float density, float prediction, const float *v) {
     static const float LARGEST = 0.005f,
                        DENSE = 0.99f; /* near the surface neighbours come and go: nothing to learn there */
     float expected = 0.0f;
-    if (prediction > 0.0f && density > DENSE && params->pressure_solver == 0)
+    /* who moves less than a hundredth of the spacing a step has no curved part to foresee, only noise to
+     * repeat */
+    const float least = 0.02f * params->particle_radius / params->time_step;
+    const bool moves = v[0] * v[0] + v[1] * v[1] + v[2] * v[2] > least * least;
+    if (moves && prediction > 0.0f && density > DENSE && params->pressure_solver == 0)
         expected = params->feedforward * (density - prediction);
     expected = expected > LARGEST ? LARGEST : expected < -LARGEST ? -LARGEST : expected;
     return params->softening * (density - 1.0f) + expected;
@@ -247,7 +251,8 @@ static void prepare(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, f
             /* divergence: where there is room to the rest density, approaching is no fault: thin water falls
              * together freely */
             dfsph->source[i] = kind == SOLVE_DENSITY ? density_source(problem->params, density[i],
-                                                                      problem->particles->prediction[i])
+                                                                      problem->particles->prediction[i],
+                                                                      problem->particles->velocity[i])
                                : density[i] < 1.0f   ? density[i] - 1.0f
                                                      : 0.0f;
         }
