@@ -7,7 +7,7 @@
 /* OpenMP's idle threads spin for milliseconds by default. As soon as anything else runs on the machine, the
  * spinning takes the cores from the very threads it waits for: a step of 25 ms took 350. The runtime reads
  * its settings before main, so the program starts itself once more with short spinning, unless the user has
- * chosen. A shorter name of the same in LLVM's runtime is KMP_BLOCKTIME. */
+ * chosen. KMP_BLOCKTIME is LLVM's name for it. */
 static void limit_spinning(char **argv) {
     static const char *const settings[][2] = {{"GOMP_SPINCOUNT", "1000"}, {"KMP_BLOCKTIME", "0"}};
     if (getenv("OMP_WAIT_POLICY") != NULL)

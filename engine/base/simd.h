@@ -43,18 +43,6 @@ static inline Vf vf_sub(Vf a, Vf b) {
 static inline Vf vf_mul(Vf a, Vf b) {
     return _mm512_mul_ps(a, b);
 }
-static inline Vf vf_div(Vf a, Vf b) {
-    return _mm512_div_ps(a, b);
-}
-static inline Vf vf_sqrt(Vf a) {
-    return _mm512_sqrt_ps(a);
-}
-static inline Vf vf_max(Vf a, Vf b) {
-    return _mm512_max_ps(a, b);
-}
-static inline Vf vf_min(Vf a, Vf b) {
-    return _mm512_min_ps(a, b);
-}
 /* a * b + c, rounded once */
 static inline Vf vf_fma(Vf a, Vf b, Vf c) {
     return _mm512_fmadd_ps(a, b, c);
@@ -218,18 +206,6 @@ static inline Vf vf_sub(Vf u, Vf v) {
 }
 static inline Vf vf_mul(Vf u, Vf v) {
     return VF(_mm256_mul_ps(u.a, v.a), _mm256_mul_ps(u.b, v.b));
-}
-static inline Vf vf_div(Vf u, Vf v) {
-    return VF(_mm256_div_ps(u.a, v.a), _mm256_div_ps(u.b, v.b));
-}
-static inline Vf vf_sqrt(Vf u) {
-    return VF(_mm256_sqrt_ps(u.a), _mm256_sqrt_ps(u.b));
-}
-static inline Vf vf_max(Vf u, Vf v) {
-    return VF(_mm256_max_ps(u.a, v.a), _mm256_max_ps(u.b, v.b));
-}
-static inline Vf vf_min(Vf u, Vf v) {
-    return VF(_mm256_min_ps(u.a, v.a), _mm256_min_ps(u.b, v.b));
 }
 static inline Vf vf_fma(Vf u, Vf v, Vf w) {
     return VF(_mm256_fmadd_ps(u.a, v.a, w.a), _mm256_fmadd_ps(u.b, v.b, w.b));
@@ -412,22 +388,6 @@ static inline Vf vf_sub(Vf a, Vf b) {
 }
 static inline Vf vf_mul(Vf a, Vf b) {
     EACH_LANE a.v[l] *= b.v[l];
-    return a;
-}
-static inline Vf vf_div(Vf a, Vf b) {
-    EACH_LANE a.v[l] /= b.v[l];
-    return a;
-}
-static inline Vf vf_sqrt(Vf a) {
-    EACH_LANE a.v[l] = sqrtf(a.v[l]);
-    return a;
-}
-static inline Vf vf_max(Vf a, Vf b) {
-    EACH_LANE a.v[l] = a.v[l] > b.v[l] ? a.v[l] : b.v[l];
-    return a;
-}
-static inline Vf vf_min(Vf a, Vf b) {
-    EACH_LANE a.v[l] = a.v[l] < b.v[l] ? a.v[l] : b.v[l];
     return a;
 }
 static inline Vf vf_fma(Vf a, Vf b, Vf c) {
