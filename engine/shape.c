@@ -92,13 +92,13 @@ static inline void window_direction(const Shape *shape, float x, float y, float 
 }
 
 /* A prism, from the distance to its outline and the gradient (x, z) of that. */
-static inline float prism_distance(const Shape *shape, const float own[3], float outline,
-                                   const float slope[2], bool sides, float gradient[3]) {
+static inline float prism_distance(const Shape *shape, float y, float outline, const float slope[2],
+                                   bool sides, float gradient[3]) {
     float weight[2] = {1.0f, 0.0f};
-    const float cap = fabsf(own[1]) - shape->half[1];
+    const float cap = fabsf(y) - shape->half[1];
     const float distance = sides ? outline : join(outline, cap, gradient ? weight : NULL);
     if (gradient)
-        window_direction(shape, weight[0] * slope[0], copysignf(weight[1], own[1]), weight[0] * slope[1],
+        window_direction(shape, weight[0] * slope[0], copysignf(weight[1], y), weight[0] * slope[1],
                          gradient);
     return distance;
 }
@@ -112,83 +112,86 @@ static inline float box_at(const Shape *shape, const float point[3], bool sides,
         slope[0] = copysignf(slope[0], own[0]);
         slope[1] = copysignf(slope[1], own[2]);
     }
-    return prism_distance(shape, own, outline, slope, sides, gradient);
+    return prism_distance(shape, own[1], outline, slope, sides, gradient);
 }
 
 static inline float cylinder_at(const Shape *shape, const float point[3], bool sides, float gradient[3]) {
     float own[3], slope[2] = {0};
     own_position(shape, point, own);
     const float outline = axis_distance(own[0], own[2], gradient ? slope : NULL) - shape->radius;
-    return prism_distance(shape, own, outline, slope, sides, gradient);
+    return prism_distance(shape, own[1], outline, slope, sides, gradient);
 }
 
-/* The branch whose half-plane sector holds each point: the direction of its tip. Loops of one point and of
- * many, branches outside: a search within a point would not vectorise. */
-static inline void star_tips(const Shape *shape, const float (*restrict own)[STAR_BATCH], uint32_t count,
-                             float (*restrict tip)[STAR_BATCH]) {
-    float along[STAR_BATCH];
-    for (uint32_t i = 0; i < count; i++)
-        along[i] = -INFINITY;
+/* A few points, a coordinate an array, and the tips of the branches they belong to. */
+typedef struct StarPoints {
+    float x[STAR_BATCH], y[STAR_BATCH], z[STAR_BATCH];
+    float tip_x[STAR_BATCH], tip_z[STAR_BATCH], along[STAR_BATCH];
+} StarPoints;
+
+/* The branch that each point is farthest out on. Branches in the outer loop: a search within each point would
+ * not vectorise. */
+static inline void star_tips(const Shape *shape, StarPoints *points, int count) {
+    for (int i = 0; i < count; i++)
+        points->along[i] = -INFINITY;
     for (int b = 0; b < shape->branches; b++) {
         const float x = shape->tips[b][0], z = shape->tips[b][1];
-        for (uint32_t i = 0; i < count; i++) {
-            const float other = own[0][i] * x + own[2][i] * z;
-            tip[0][i] = other > along[i] ? x : tip[0][i];
-            tip[1][i] = other > along[i] ? z : tip[1][i];
-            along[i] = larger(other, along[i]);
+        for (int i = 0; i < count; i++) {
+            const float along = points->x[i] * x + points->z[i] * z;
+            const bool farther = along > points->along[i];
+            points->tip_x[i] = farther ? x : points->tip_x[i];
+            points->tip_z[i] = farther ? z : points->tip_z[i];
+            points->along[i] = farther ? along : points->along[i];
         }
     }
 }
 
-static inline float star_distance(const Shape *shape, const float own[3], const float tip[2], bool sides,
+static inline float star_distance(const Shape *shape, const StarPoints *points, int i, bool sides,
                                   float gradient[3]) {
+    const float x = points->x[i], z = points->z[i], tip_x = points->tip_x[i], tip_z = points->tip_z[i];
     float slope[2] = {0}, folded_slope[2] = {0};
-    const float across = own[0] * tip[1] - own[2] * tip[0];
-    const float folded[2] = {own[0] * tip[0] + own[2] * tip[1], fabsf(across)};
+    const float across = x * tip_z - z * tip_x;
+    const float folded[2] = {x * tip_x + z * tip_z, fabsf(across)};
     const float outline =
         edge_distance(&shape->edge, 0.0f, shape->edge.length, folded, gradient ? folded_slope : NULL);
     if (gradient) {
         const float turn = across < 0.0f ? -folded_slope[1] : folded_slope[1];
-        slope[0] = folded_slope[0] * tip[0] + turn * tip[1];
-        slope[1] = folded_slope[0] * tip[1] - turn * tip[0];
+        slope[0] = folded_slope[0] * tip_x + turn * tip_z;
+        slope[1] = folded_slope[0] * tip_z - turn * tip_x;
     }
-    return prism_distance(shape, own, outline, slope, sides, gradient);
+    return prism_distance(shape, points->y[i], outline, slope, sides, gradient);
+}
+
+static inline void star_load(const Shape *shape, const float point[3], StarPoints *points, int i) {
+    float own[3];
+    own_position(shape, point, own);
+    points->x[i] = own[0];
+    points->y[i] = own[1];
+    points->z[i] = own[2];
+    points->tip_x[i] = points->tip_z[i] = 0.0f;
 }
 
 static float star_at(const Shape *shape, const float point[3], bool sides, float gradient[3]) {
-    float own[3], column[3][STAR_BATCH], tip[2][STAR_BATCH] = {{0}};
-    own_position(shape, point, own);
-    for (int k = 0; k < 3; k++)
-        column[k][0] = own[k];
-    star_tips(shape, (const float(*)[STAR_BATCH])column, 1, tip);
-    return star_distance(shape, own, (const float[2]){tip[0][0], tip[1][0]}, sides, gradient);
-}
-
-static inline void star_part(const Shape *shape, const float (*restrict points)[4], uint32_t count,
-                             bool sides, float *restrict distance) {
-    float own[3][STAR_BATCH], tip[2][STAR_BATCH];
-    for (uint32_t i = 0; i < count; i++) {
-        float at[3];
-        own_position(shape, points[i], at);
-        own[0][i] = at[0];
-        own[1][i] = at[1];
-        own[2][i] = at[2];
-    }
-    star_tips(shape, (const float(*)[STAR_BATCH])own, count, tip);
-    for (uint32_t i = 0; i < count; i++) {
-        const float at[3] = {own[0][i], own[1][i], own[2][i]}, tip_at[2] = {tip[0][i], tip[1][i]};
-        distance[i] = star_distance(shape, at, tip_at, sides, NULL);
-    }
+    StarPoints one;
+    star_load(shape, point, &one, 0);
+    star_tips(shape, &one, 1);
+    return star_distance(shape, &one, 0, sides, gradient);
 }
 
 static void star_batch(const Shape *shape, const float (*restrict points)[4], uint32_t count, bool sides,
                        float *restrict distance) {
-    for (uint32_t i = 0; i < count; i += STAR_BATCH) {
-        const uint32_t part = count - i < STAR_BATCH ? count - i : STAR_BATCH;
+    StarPoints part;
+    for (uint32_t first = 0; first < count; first += STAR_BATCH) {
+        const int size = count - first < STAR_BATCH ? (int)(count - first) : STAR_BATCH;
+        float *out = distance + first;
+        for (int i = 0; i < size; i++)
+            star_load(shape, points[first + (uint32_t)i], &part, i);
+        star_tips(shape, &part, size);
         if (sides)
-            star_part(shape, points + i, part, true, distance + i);
+            for (int i = 0; i < size; i++)
+                out[i] = star_distance(shape, &part, i, true, NULL);
         else
-            star_part(shape, points + i, part, false, distance + i);
+            for (int i = 0; i < size; i++)
+                out[i] = star_distance(shape, &part, i, false, NULL);
     }
 }
 
