@@ -64,15 +64,25 @@ typedef enum SkiffGeometryKind {
     SKIFF_GEOMETRY_MESH,
     SKIFF_GEOMETRY_BOX,
     SKIFF_GEOMETRY_SPHERE,
-    SKIFF_GEOMETRY_PLANES
+    SKIFF_GEOMETRY_PLANES,
+    SKIFF_GEOMETRY_CYLINDER,
+    SKIFF_GEOMETRY_STAR,
+    SKIFF_GEOMETRY_CONE
 } SkiffGeometryKind;
 
-/* Own frame -> world: scale, rotate about `rotation_axis` by `rotation_angle` (rad), translate. */
+enum { SKIFF_MAX_BRANCHES = 64 }; /* of a star */
+
+/* Own frame -> world: scale, rotate about `rotation_axis` by `rotation_angle` (rad), translate. Everything
+ * but meshes and planes is centred on its own origin; cylinders, stars and cones stand upright. */
 typedef struct SkiffGeometryDef {
     SkiffGeometryKind kind;
     const char *file;               /* mesh: OBJ file, closed */
-    float size[3];                  /* box: edge lengths, centred on the origin, m */
-    float radius;                   /* sphere, centred on the origin, m */
+    float size[3];                  /* box: edge lengths, m */
+    float radius;                   /* m; sphere, cylinder; star: of its tips; cone: at the bottom */
+    float inner_radius;             /* star: of the corners between tips, above 0 and up to radius, m */
+    float top_radius;               /* cone: at the top, 0 for a tip, may exceed radius, m */
+    float height;                   /* cylinder, star, cone, m */
+    int branches;                   /* star: 2 to SKIFF_MAX_BRANCHES; the first points towards +z */
     const float (*plane_points)[3]; /* planes: convex region (p - point) . normal <= 0; normals point out */
     const float (*plane_normals)[3];
     int plane_count;
@@ -85,7 +95,7 @@ typedef struct SkiffGeometryDef {
 /* The walls around the fluid: the inside of a closed geometry. */
 typedef struct SkiffTankDef {
     SkiffGeometryDef geometry; /* kind NONE: no tank */
-    bool open;                 /* boxes: no lid */
+    bool open;                 /* no lid */
     float wet_height;          /* only walls below this y are sampled, m; INFINITY: all */
 } SkiffTankDef;
 
