@@ -16,7 +16,9 @@ enum { BYTES_PER_PARTICLE = 800 };
 
 /* ---- Machine ---- */
 
-static int default_threads(void) {
+int sim_threads(int wanted) {
+    if (wanted > 0)
+        return wanted;
     /* hyper-threads share the units that the passes keep busy: one thread a core */
     int cores = 0;
     const int cpus = omp_get_num_procs();
@@ -31,7 +33,8 @@ static int default_threads(void) {
             cores++;
         fclose(file);
     }
-    return cores > 0 && cores < cpus ? cores : cpus;
+    cores = cores > 0 && cores < cpus ? cores : cpus;
+    return cores < ROWS_MAX_THREADS ? cores : ROWS_MAX_THREADS;
 }
 
 static bool simd_available(SkiffSimd simd) {
@@ -63,9 +66,7 @@ static bool choose_passes(SkiffSim *sim, const SkiffDef *def, Err *err) {
     if (def->threads < 0 || def->threads > ROWS_MAX_THREADS)
         return err_add(err, ERR_USAGE, "threads: %d is out of range, allowed is 0 to %d", def->threads,
                        ROWS_MAX_THREADS);
-    sim->threads = def->threads > 0 ? def->threads : default_threads();
-    if (sim->threads > ROWS_MAX_THREADS)
-        sim->threads = ROWS_MAX_THREADS;
+    sim->threads = sim_threads(def->threads);
     return true;
 }
 

@@ -78,4 +78,7 @@ void probes_free(SkiffSim *sim);
 
 double timer_ms(void);
 
+/* `wanted`, or when that is 0 the number of physical cores this process may use. */
+int sim_threads(int wanted);
+
 #endif
