@@ -253,6 +253,11 @@ static const Field block_fields[] = {
      .help = "Corner with the smallest coordinates; the first particle is half a spacing inside"},
     {ROW(FIELD_VEC3, SkiffBlockDef, end, "end"), COORDINATE, .flags = FIELD_REQUIRED,
      .help = "Corner with the largest coordinates; (end - start) / spacing particles along each axis"},
+    {ROW(FIELD_ENUM, SkiffBlockDef, fill, "fill"), .names = "lattice|rest",
+     .help = "lattice: points of a cubic lattice, all inside; rest: water at rest wherever walls, bodies and "
+             "existing water leave room"},
+    {ROW(FIELD_VEC3, SkiffBlockDef, offset, "offset"), COORDINATE,
+     .help = "Shifts the pattern of the points of fill rest"},
     {ROW(FIELD_VEC3, SkiffBlockDef, velocity, "velocity"), SPEED, .help = "Velocity when emitted"},
     {ROW(FIELD_DOUBLE, SkiffBlockDef, time, "time"), DURATION, .help = "When it is emitted; 0: at the start"},
     {ROW(FIELD_DOUBLE, SkiffBlockDef, period, "period"), DURATION, .help = "Time between repetitions"},

@@ -2,7 +2,7 @@
 #ifndef SKIFF_SIM_H
 #define SKIFF_SIM_H
 
-#include "dfsph.h"
+#include "rest.h"
 #include "shape.h"
 
 typedef struct EmitBlock {
@@ -58,6 +58,11 @@ struct SkiffSim {
     Buffer object_forces; /* [objects][6] force (N) and torque about the object's centre (N m) of the last
                              step */
 
+    /* filling */
+    RestTile tile; /* loaded with the first fill */
+    RestCloud rest;
+    SkiffFill fill;
+
     /* advance */
     Buffer sums; /* [blocks] partial sums of the statistics */
     SkiffStats stats;
@@ -70,11 +75,16 @@ bool block_emit(SkiffSim *sim, uint32_t *emitted, Err *err);
  * input). */
 double block_particles(const SkiffBlockDef *def, float spacing, double counts[3]);
 
-/* Gravity, viscosity and wall friction of one step, for fluid and bodies. */
-void forces_apply(SkiffSim *sim);
+/* Gravity, viscosity, calming and wall friction of one step, for fluid and bodies. */
+void forces_apply(SkiffSim *sim, const DfsphProblem *problem);
+/* The fluid's part, but for friction. Uses the solver's vectors between its solves. */
+void forces_apply_fluid(const DfsphProblem *problem, Dfsph *dfsph);
 
 bool probes_make(SkiffSim *sim, const SkiffDef *def, Err *err);
 void probes_free(SkiffSim *sim);
+
+/* Room for `capacity` particles in everything a step uses; what is there stays. */
+bool sim_reserve(SkiffSim *sim, uint32_t capacity, Err *err);
 
 double timer_ms(void);
 

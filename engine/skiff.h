@@ -99,14 +99,22 @@ typedef struct SkiffTankDef {
     float wet_height;          /* only walls below this y are sampled, m; INFINITY: all */
 } SkiffTankDef;
 
-/* An axis-aligned block on a cubic lattice of spacing d: round((end - start) / d) particles along each axis,
- * at least one. */
+typedef enum SkiffFillKind {
+    SKIFF_FILL_LATTICE, /* a cubic lattice of spacing d: round((end - start) / d) particles along each axis,
+                           at least one; all of it must be inside the tank and free of water */
+    SKIFF_FILL_REST /* water at rest [Carensac2023 sec. 3]: as much as walls, bodies and water that is there
+                       already leave room for; its surface is the top of the block */
+} SkiffFillKind;
+
+/* An axis-aligned block of water. */
 typedef struct SkiffBlockDef {
     float start[3], end[3]; /* m */
-    float velocity[3];      /* m/s */
-    double time;            /* s, when it is emitted; <= 0: at the start */
-    double period;          /* s between repetitions */
-    int repeat;             /* how many times in all, >= 1 */
+    SkiffFillKind fill;
+    float offset[3];   /* rest: shifts the pattern of the points, m */
+    float velocity[3]; /* m/s */
+    double time;       /* s, when it is emitted; <= 0: at the start */
+    double period;     /* s between repetitions */
+    int repeat;        /* how many times in all, >= 1 */
 } SkiffBlockDef;
 
 /* Bits of SkiffBodyDef.free_axes: translation along and rotation about the world's axes. */
@@ -272,6 +280,26 @@ typedef struct SkiffStats {
     double step_ms;
 } SkiffStats;
 const SkiffStats *skiff_stats(const SkiffSim *sim);
+
+/* What filling with water at rest did: counts, densities and times of [Carensac2023 table 1]. Densities are
+ * relative to rest density, over the candidates (points that feel a solid or existing water). */
+typedef struct SkiffFill {
+    uint32_t particles;    /* new */
+    uint32_t candidates;   /* before the selection */
+    uint32_t selected;     /* left of them */
+    uint32_t active;       /* particles that are stabilised */
+    uint32_t rim;          /* particles beside them that stand still meanwhile */
+    int passes;            /* of the selection, the first and the last that only look included */
+    int steps;             /* of the stabilisation */
+    double density_mean;   /* after the selection, with the air still there */
+    double density_spread; /* standard deviation about the mean */
+    double density_rms;    /* root of the mean squared distance from the target */
+    double mean_speed,
+        max_speed; /* m/s, of the active in the last step of the stabilisation, before damping */
+    double load_ms, select_ms, settle_ms;
+} SkiffFill;
+/* The last fill; all zero when there was none. */
+const SkiffFill *skiff_fill(const SkiffSim *sim);
 
 /* Probe channels, in the order of the def: a height or pressure gives one value, a force six (fx fy fz tx ty
  * tz). */

@@ -75,6 +75,11 @@ static void solve_divergence(SkiffSim *sim) {
     sim->stats.divergence_error_percent = 100.0 * result.error;
 }
 
+static void apply_forces(SkiffSim *sim) {
+    const DfsphProblem problem = step_problem(sim);
+    forces_apply(sim, &problem);
+}
+
 static void solve_density(SkiffSim *sim) {
     const DfsphProblem problem = step_problem(sim);
     const SolveResult result = dfsph_solve(&sim->dfsph, &problem, SOLVE_DENSITY);
@@ -230,7 +235,7 @@ bool skiff_step(SkiffSim *sim, Err *err) {
     PHASE_RUN(SEARCH, good = find_neighbours(sim, err));
     PHASE_RUN(BOUNDARY, good = add_boundary(sim, err));
     PHASE_RUN(DIVERGENCE, solve_divergence(sim));
-    PHASE_RUN(FORCES, forces_apply(sim));
+    PHASE_RUN(FORCES, apply_forces(sim));
     PHASE_RUN(PRESSURE, solve_density(sim));
     PHASE_RUN(ADVANCE, measure_forces(sim); advance(sim); good = check(sim, err));
     sim->stats.step_ms = timer_ms() - begin;

@@ -24,6 +24,10 @@ int skiff_threads(const SkiffSim *sim) {
     return sim->threads;
 }
 
+const SkiffFill *skiff_fill(const SkiffSim *sim) {
+    return &sim->fill;
+}
+
 const SkiffStats *skiff_stats(const SkiffSim *sim) {
     return &sim->stats;
 }
