@@ -608,6 +608,38 @@ static void the_boat_floats_on_its_lines(void **state) {
     shape_free(&boat);
 }
 
+/* The stem and the coaming are thinner than two offsets; the rest gets all of it, and nothing sticks out. */
+static void samples_of_the_boat_lie_behind_its_surface(void **state) {
+    (void)state;
+    SkiffDef def = skiff_def_default();
+    SkiffBodyDef body = skiff_body_default();
+    body.name = "boat";
+    body.geometry.kind = SKIFF_GEOMETRY_MESH;
+    body.geometry.file = MESHES "boat.obj";
+    def.params.particle_radius = 0.04f;
+    def.params.boundary_offset = 1.15f;
+    def.threads = 1;
+    def.bodies = &body;
+    def.body_count = 1;
+    SkiffSim *sim = start(&def);
+    Shape boat = make(&body.geometry, (const double[3]){0, 0, 0});
+    SkiffBoundary samples;
+    skiff_boundary_samples(sim, true, &samples);
+    assert_true(samples.count > 5000);
+    float *distance = malloc(samples.count * sizeof *distance);
+    assert_non_null(distance);
+    shape_distances(&boat, samples.position, samples.count, distance, 1);
+    uint32_t deep = 0;
+    for (uint32_t s = 0; s < samples.count; s++) {
+        assert_true(distance[s] < 1e-5f);
+        deep += fabsf(distance[s] + 1.15f * 0.04f) < 0.1f * 0.04f;
+    }
+    assert_true(deep > samples.count * 7 / 10);
+    free(distance);
+    shape_free(&boat);
+    skiff_destroy(sim);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(shapes_conform),
@@ -618,6 +650,7 @@ int main(void) {
         cmocka_unit_test(every_shape_is_a_body),
         cmocka_unit_test(meshes_are_bodies),
         cmocka_unit_test(the_boat_floats_on_its_lines),
+        cmocka_unit_test(samples_of_the_boat_lie_behind_its_surface),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
