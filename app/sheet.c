@@ -241,9 +241,9 @@ void sheet_write_html(FILE *out, const Sheet *sheet) {
             const int decimals = sheet->columns[c].decimals;
             write_cell(out, "<td>", figure.median, decimals);
             if (row->run_count > 1 && !isnan(figure.low)) {
-                write_cell(out, "<br><span class=\"soft\">", figure.low, decimals);
+                write_cell(out, "<br><small>", figure.low, decimals);
                 write_cell(out, " to ", figure.high, decimals);
-                fputs("</span>", out);
+                fputs("</small>", out);
             }
             fputs("</td>", out);
         }
