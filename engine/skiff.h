@@ -196,6 +196,10 @@ void skiff_destroy(SkiffSim *sim);
  * which the fault was found. */
 bool skiff_step(SkiffSim *sim, Err *err);
 
+/* Takes away the fluid particles inside [min, max) (m, world); the others stay as they are. ERR_INPUT: no
+ * memory, and nothing is removed. */
+bool skiff_remove_box(SkiffSim *sim, const double min[3], const double max[3], uint32_t *removed, Err *err);
+
 /* ---- Looking ---- */
 
 double skiff_time(const SkiffSim *sim); /* s */

@@ -159,6 +159,17 @@ static void usage_mistakes_exit_with_2(void **state) {
         {"run a.json -o out --resume", "skiff run: out: there is no such folder to resume\n"},
         {"bench a.json --steps 0",
          "skiff bench: --steps: expected an integer from 1 to 1e+06, found \"0\"\n"},
+        {"rest", "skiff rest: a command is missing\nTry 'skiff rest --help'.\n"},
+        {"rest mkae", "skiff rest: unknown command mkae, did you mean make?\nTry 'skiff rest --help'.\n"},
+        {"help rest mkae", "skiff rest: unknown command mkae, did you mean make?\n"},
+        {"rest make tile", "skiff rest make: takes options only, \"tile\" is given\n"},
+        {"rest make --edge 5", "skiff rest make: --edge: expected a number from 6 to 64, found \"5\"\n"},
+        {"rest cut -o block.skiff", "skiff rest cut: the folder is missing\n"},
+        {"rest cut out", "skiff rest cut: -o FILE is missing\n"},
+        {"rest cut out --min 1,2,x",
+         "skiff rest cut: --min: expected three numbers, X,Y,Z, found \"1,2,x\"\n"},
+        {"rest cut out --max 1,2,3,4",
+         "skiff rest cut: --max: expected three numbers, X,Y,Z, found \"1,2,3,4\"\n"},
         {"check " SMALL " --set viscosty=1",
          "skiff check: --set viscosty=1: no key \"viscosty\", did you mean viscosity?\n"},
     };
@@ -173,6 +184,9 @@ static void help_explains_every_command(void **state) {
     expect("-h", 0, "Exit codes: 0 ok, 2 usage, 3 bad input, 5 diverged", NULL);
     expect("help", 0, "skiff bench SCENE", NULL);
     expect("--version", 0, "commit ", NULL);
+    expect("rest --help", 0, "skiff rest cut DIR -o FILE", NULL);
+    expect("help rest", 0, "skiff rest show [FILE]", NULL);
+    expect("help rest make", 0, "Usage: skiff rest make [-o FILE] [OPTION]...", NULL);
     for (int i = 0; i < COUNT(commands); i++) {
         char arguments[64], usage[64];
         snprintf(usage, sizeof usage, "Usage: skiff %s SCENE", commands[i]);
@@ -187,7 +201,9 @@ static void help_explains_every_command(void **state) {
 
 static void help_lines_are_short(void **state) {
     (void)state;
-    static const char *const arguments[] = {"--help", "run --help", "check --help", "bench --help"};
+    static const char *const arguments[] = {"--help",          "run --help",      "check --help",
+                                            "bench --help",    "rest --help",     "rest make --help",
+                                            "rest cut --help", "rest show --help"};
     for (int i = 0; i < COUNT(arguments); i++) {
         Result result = finish(start(arguments[i]));
         for (const char *line = result.out; *line;) {
@@ -586,6 +602,48 @@ static void damaged_tables_are_refused(void **state) {
     }
 }
 
+/* ---- Water at rest ---- */
+
+static double figure_of(const char *arguments, const char *key) {
+    Result result = finish(start(arguments));
+    if (result.code != 0)
+        fail_msg("skiff %s: exit code %d\n%s", arguments, result.code, result.err);
+    assert_non_null(strchr(result.out, '\n'));
+    assert_string_equal(strchr(result.out, '\n'), "\n"); /* one line */
+    json_t *line = json_loads(result.out, 0, NULL);
+    assert_true(json_is_number(json_object_get(line, key)));
+    double value = json_number_value(json_object_get(line, key));
+    json_decref(line);
+    drop(&result);
+    return value;
+}
+
+static void rest_tiles_are_made_and_shown(void **state) {
+    (void)state;
+    expect("rest show", 0, "periodic tile of 2171 points", NULL);
+    assert_true(figure_of("rest make --edge 6 --seed 3 --threads 1 -o a.tile --json", "points") == 271);
+    double spread = figure_of("rest show a.tile --json", "density_sd_percent");
+    assert_true(spread > 0 && spread < 0.01);
+    expect("rest show nowhere.tile", ERR_INPUT, NULL, "nowhere.tile: ");
+    write_text("no.tile", "not a tile");
+    expect("rest show no.tile", ERR_INPUT, NULL, "no.tile: not a Skiff state file");
+}
+
+static void blocks_are_cut_from_runs(void **state) {
+    (void)state;
+    expect("rest cut nowhere -o b.block", ERR_INPUT, NULL, "nowhere: there is no such folder");
+    expect("run " SMALL " -o tank -q --duration 0.03", 0, NULL, NULL);
+    expect("rest cut tank -o b.block", ERR_INPUT, NULL,
+           "nothing to cut: the box that --min and --max give reaches");
+    expect("rest cut tank --min -0.2,0.1,-0.2 --max 0.2,0.25,0.2 -o b.block", ERR_INPUT, NULL,
+           "0.15 m long in y: it must be longer than two support radii, 0.2 m");
+    assert_false(exists("b.block"));
+    expect("rest cut tank --min -0.2,0.05,-0.2 --max 0.2,0.35,0.2 -o b.block", 0, "block of ", NULL);
+    assert_float_equal(figure_of("rest show b.block --json", "size_y"), 12, 1e-5);
+    expect("rest cut tank --min -0.2,0.3,-0.2 --max 0.2,0.1,0.2 -o c.block", ERR_INPUT, NULL,
+           "tank: nothing to cut: the box that --min and --max give reaches from 0.3 to 0.1 m in y");
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(usage_mistakes_exit_with_2),
@@ -606,6 +664,8 @@ int main(void) {
         cmocka_unit_test(bench_keeps_rows),
         cmocka_unit_test(a_full_disk_is_noticed),
         cmocka_unit_test(damaged_tables_are_refused),
+        cmocka_unit_test(rest_tiles_are_made_and_shown),
+        cmocka_unit_test(blocks_are_cut_from_runs),
     };
     return cmocka_run_group_tests_name("cli", tests, make_folder, remove_folder);
 }
