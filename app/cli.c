@@ -45,6 +45,7 @@ typedef struct Command {
     const Option *options;
     int option_count;
     bool (*run)(const CliArgs *args, Err *err);
+    const char *operand; /* what its argument is; NULL: a scene */
 } Command;
 
 /* ---- The tables ---- */
@@ -71,6 +72,10 @@ typedef struct Command {
 
 static const Option run_options[] = {
     {'o', "output", "DIR", OPTION_TEXT, AT(output), .help = "Folder for the results, created; required"},
+    {'i', "input", "FILE", OPTION_TEXT, AT(input),
+     .help =
+         "Input file that drives and steers, in place of the scene's. Lines: TIME throttle|rudder|heading "
+         "VALUE, TIME press|release KEY, TIME camera NAME"},
     {'d', "duration", "S", OPTION_NUMBER, AT(duration), .min = 1e-6, .max = 1e6,
      .help = "Simulated seconds, in place of the scene's"},
     OPTION_ROWS_ENGINE,
@@ -108,17 +113,23 @@ static const Option bench_options[] = {
     OPTION_ROW_HELP,
 };
 
+static const Option profile_options[] = {
+    {0, "json", NULL, OPTION_FLAG, AT(json), .help = "One line of JSON in place of the table"},
+    OPTION_ROW_HELP,
+};
+
 static const Command commands[] = {
     {"run", "SCENE -o DIR", "Simulate a scene and write its results into a folder",
-     "The folder receives report.html (charts; open it in a browser), summary.json, steps.csv, hull.csv "
-     "(bodies),\n"
-     "probes.csv, scene.json (the scene with every default filled in) and state.skiff (checkpoint).\n"
+     "The folder receives report.html (charts; open it in a browser), summary.json, steps.csv, ledger.csv\n"
+     "(particles in and out by cause), hull.csv (bodies), probes.csv, trace.json (opens in Perfetto),\n"
+     "scene.json (the scene with every default filled in), run.input (what was driven; --input replays it)\n"
+     "and state.skiff (checkpoint).\n"
      "Ctrl-C finishes the step, writes a checkpoint and the report, and exits with 130; --resume goes on "
      "from there.\n",
      "  skiff run assets/scenes/settling-tank.json -o out/tank\n"
      "  skiff run assets/scenes/dam-body.json -o out/dam --duration 2 --set RigidBodies[0].density=300\n"
      "  skiff run assets/scenes/dam-body.json -o out/dam --resume --duration 4\n",
-     run_options, COUNT(run_options), run_command},
+     run_options, COUNT(run_options), run_command, NULL},
     {"check", "SCENE", "Check a scene and show what it means",
      "Reports every problem of the file, with its place, the values allowed and the nearest name. A good\n"
      "scene is printed to stdout as JSON with every default filled in; counts, bodies and memory follow on\n"
@@ -126,14 +137,22 @@ static const Command commands[] = {
      "  skiff check assets/scenes/floating-box.json\n"
      "  skiff check scene.json --set particleRadius=0.02 > effective.json\n"
      "  skiff check --schema > scene.schema.json\n",
-     check_options, COUNT(check_options), check_command},
+     check_options, COUNT(check_options), check_command, NULL},
     {"bench", "SCENE", "Measure the time of a step",
      "Lets the scene settle, then times windows of steps and prints the median over the windows: ms for\n"
      "each phase, iterations, particles a second, and the errors reached. Appends a row to the scene's CSV\n"
      "file of results.\n",
      "  skiff bench assets/scenes/bench-tank.json\n"
      "  skiff bench assets/scenes/bench-dam.json --settle 0 --steps 95 --windows 7 --json\n",
-     bench_options, COUNT(bench_options), bench_command},
+     bench_options, COUNT(bench_options), bench_command, NULL},
+    {"profile", "DIR", "Show where the time of a run's steps went",
+     "Reads steps.csv in a folder of results: percentiles of the step times, means of each phase for all\n"
+     "steps, for plain ones (no window move, nor one within the last five steps) and for window moves, the\n"
+     "mean of the five steps after a move, and for the ten slowest steps what they did that others did "
+     "not.\n",
+     "  skiff profile out/tank\n"
+     "  skiff profile out/tank --json\n",
+     profile_options, COUNT(profile_options), profile_command, "folder"},
 };
 
 /* ---- Help ---- */
@@ -308,6 +327,7 @@ static bool parse_option(const Command *command, int argc, char **argv, int *i, 
 }
 
 static bool parse(const Command *command, int argc, char **argv, CliArgs *args, Err *err) {
+    const char *operand = command->operand ? command->operand : "scene";
     bool only_arguments = false;
     for (int i = 0; i < argc; i++) {
         if (!only_arguments && strcmp(argv[i], "--") == 0) {
@@ -316,14 +336,14 @@ static bool parse(const Command *command, int argc, char **argv, CliArgs *args, 
             if (!parse_option(command, argc, argv, &i, args, err))
                 return false;
         } else if (args->scene) {
-            return err_set(err, ERR_USAGE, "one scene at a time: \"%.200s\" and \"%.200s\" are given",
+            return err_set(err, ERR_USAGE, "one %s at a time: \"%.200s\" and \"%.200s\" are given", operand,
                            args->scene, argv[i]);
         } else {
             args->scene = argv[i];
         }
     }
     if (!args->scene && !args->help && !args->schema)
-        return err_set(err, ERR_USAGE, "the scene is missing");
+        return err_set(err, ERR_USAGE, "the %s is missing", operand);
     return true;
 }
 

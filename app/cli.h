@@ -8,7 +8,8 @@ enum { CLI_MAX_EDITS = 64 };
 
 /* What the command line said. Options that a command does not have keep their defaults. */
 typedef struct CliArgs {
-    const char *scene;                /* NULL where it may be left out and was */
+    const char *scene;                /* or folder; NULL where it may be left out and was */
+    const char *input;                /* --input; NULL: not given */
     const char *output;               /* -o; NULL: not given */
     double duration;                  /* s; NaN: the scene's */
     int threads;                      /* 0: one for each core */

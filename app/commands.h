@@ -8,5 +8,6 @@
 bool run_command(const CliArgs *args, Err *err);
 bool check_command(const CliArgs *args, Err *err);
 bool bench_command(const CliArgs *args, Err *err);
+bool profile_command(const CliArgs *args, Err *err);
 
 #endif

@@ -13,7 +13,7 @@ void matrix_times(const double m[3][3], const double v[3], double result[3]) {
     memcpy(result, r, sizeof r);
 }
 
-static void quaternion_matrix(const double q[4], double m[3][3]) {
+void quaternion_matrix(const double q[4], double m[3][3]) {
     const double x = q[0], y = q[1], z = q[2], w = q[3];
     const double r[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)},
                             {2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)},
@@ -80,6 +80,15 @@ static bool geometry_check(const SkiffGeometryDef *def, const char *path, Err *e
     return good;
 }
 
+static void geometry_rotation(const SkiffGeometryDef *def, float quaternion[4]) {
+    const float *axis = def->rotation_axis;
+    const float norm = sqrtf(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
+    const float s = norm > 0.0f ? sinf(def->rotation_angle / 2) / norm : 0.0f;
+    for (int k = 0; k < 3; k++)
+        quaternion[k] = axis[k] * s;
+    quaternion[3] = cosf(def->rotation_angle / 2);
+}
+
 bool geometry_make(const SkiffGeometryDef *def, const char *path, Mesh *mesh, Err *err) {
     enum { SPHERE_LEVEL = 4 }; /* 5120 triangles: volume 0.2 % below the sphere's */
     if (!geometry_check(def, path, err))
@@ -111,12 +120,22 @@ bool geometry_make(const SkiffGeometryDef *def, const char *path, Mesh *mesh, Er
     }
     if (!made)
         return err_add(err, reason.code, "%s: %s", path, reason.message);
-    const float *axis = def->rotation_axis;
-    const float norm = sqrtf(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
-    const float s = norm > 0.0f ? sinf(def->rotation_angle / 2) / norm : 0.0f;
-    const float quaternion[4] = {axis[0] * s, axis[1] * s, axis[2] * s, cosf(def->rotation_angle / 2)};
+    float quaternion[4];
+    geometry_rotation(def, quaternion);
     mesh_transform(mesh, def->scale, quaternion, (const float[3]){0, 0, 0});
     return true;
+}
+
+void geometry_turn(const SkiffGeometryDef *def, const float direction[3], double result[3]) {
+    float quaternion[4];
+    double q[4], m[3][3], scaled[3];
+    geometry_rotation(def, quaternion);
+    for (int k = 0; k < 4; k++)
+        q[k] = (double)quaternion[k];
+    for (int k = 0; k < 3; k++)
+        scaled[k] = (double)def->scale[k] * (double)direction[k];
+    quaternion_matrix(q, m);
+    matrix_times((const double(*)[3])m, scaled, result);
 }
 
 static bool body_check(const SkiffBodyDef *def, const char *path, Err *err) {

@@ -35,6 +35,8 @@ void body_free(Body *body);
 /* Mesh of a geometry in its own rotation and scale, without the translation (which is double precision's
  * business). */
 bool geometry_make(const SkiffGeometryDef *def, const char *path, Mesh *mesh, Err *err);
+/* A direction or a vertex of the geometry as its scale and rotation leave it. */
+void geometry_turn(const SkiffGeometryDef *def, const float direction[3], double result[3]);
 
 /* Stops the free axes of a body that is still held; gives it its initial velocity in the step of its release.
  */
@@ -48,6 +50,7 @@ void body_push(Body *body, const float gravity[3], double time, double dt);
 void body_advance(Body *body, double time, double dt);
 bool body_held(const Body *body, double time);
 
+void quaternion_matrix(const double q[4], double m[3][3]);
 void matrix_times(const double m[3][3], const double v[3], double result[3]);
 
 #endif

@@ -3,6 +3,7 @@
 #define SKIFF_SIM_H
 
 #include "dfsph.h"
+#include "drive.h"
 
 typedef struct EmitBlock {
     SkiffBlockDef def;
@@ -37,6 +38,8 @@ struct SkiffSim {
     bool tank_open;
     Body *bodies;
     int body_count;
+    Drive *drives;
+    int drive_count;
     Probe *probes;
     int probe_count;
     uint32_t probe_channels;
@@ -58,7 +61,7 @@ struct SkiffSim {
                              step */
 
     /* advance */
-    Buffer sums; /* [blocks] partial sums of the statistics */
+    Buffer sums; /* [blocks] partial sums: of the statistics, of the water at a propeller */
     SkiffStats stats;
 };
 
@@ -71,6 +74,11 @@ double block_particles(const SkiffBlockDef *def, float spacing, double counts[3]
 
 /* Gravity, viscosity and wall friction of one step, for fluid and bodies. */
 void forces_apply(SkiffSim *sim);
+
+/* Drives of the bodies, which stand at their start. */
+bool drives_make(SkiffSim *sim, const SkiffDef *def, Err *err);
+/* Thrust, steering and extra drag of one step, added to what pushes the bodies. */
+void drives_apply(SkiffSim *sim);
 
 bool probes_make(SkiffSim *sim, const SkiffDef *def, Err *err);
 void probes_free(SkiffSim *sim);
