@@ -281,7 +281,7 @@ void drives_apply(SkiffSim *sim) {
             continue;
         apply_drag(body, (double)def->water_drag, (double)def->water_drag_sq, still, dt);
         apply_drag(body, (double)def->air_drag, (double)def->air_drag_sq, def->wind, dt);
-        if (sim->time + 1e-9 >= (double)def->start_time)
+        if (sim->time + 1e-3 * dt >= (double)def->start_time) /* a float: 0.15f is above 0.15 */
             apply_drive(sim, drive, body);
     }
 }
