@@ -67,15 +67,18 @@ typedef struct Command {
             .help = "Change a key of the scene, e.g. Configuration.viscosity=0.05, viscosity=0.05 for "      \
                     "short, RigidBodies[0].density=300. Repeatable"                                          \
     }
+#define OPTION_ROW_INPUT                                                                                     \
+    {                                                                                                        \
+        'i', "input", "FILE", OPTION_TEXT, AT(input),                                                        \
+            .help = "Input file that drives and steers, in place of the scene's. Lines: TIME "               \
+                    "throttle|rudder|heading VALUE, TIME press|release KEY, TIME camera NAME"                \
+    }
 #define OPTION_ROW_HELP                                                                                      \
     { 'h', "help", NULL, OPTION_FLAG, AT(help), .help = "Show this help" }
 
 static const Option run_options[] = {
     {'o', "output", "DIR", OPTION_TEXT, AT(output), .help = "Folder for the results, created; required"},
-    {'i', "input", "FILE", OPTION_TEXT, AT(input),
-     .help =
-         "Input file that drives and steers, in place of the scene's. Lines: TIME throttle|rudder|heading "
-         "VALUE, TIME press|release KEY, TIME camera NAME"},
+    OPTION_ROW_INPUT,
     {'d', "duration", "S", OPTION_NUMBER, AT(duration), .min = 1e-6, .max = 1e6,
      .help = "Simulated seconds, in place of the scene's"},
     OPTION_ROWS_ENGINE,
@@ -103,6 +106,7 @@ static const Option bench_options[] = {
      .help = "Steps of a window (default 20)"},
     {0, "windows", "N", OPTION_INTEGER, AT(windows), .min = 1, .max = 1e4, .help = "Windows (default 5)"},
     {0, "json", NULL, OPTION_FLAG, AT(json), .help = "One line of JSON in place of the table"},
+    OPTION_ROW_INPUT,
     OPTION_ROWS_ENGINE,
     OPTION_ROW_SET,
     {0, "results", "DIR", OPTION_TEXT, AT(results),

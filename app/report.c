@@ -280,6 +280,27 @@ static void write_probe_charts(FILE *out, const ReportInput *input, const double
     }
 }
 
+/* Nothing for a body without a drive. */
+static void write_drive_charts(FILE *out, const CsvTable *hull, const double *t, const char *name) {
+    static const struct {
+        const char *what, *unit, *columns[2];
+    } charts[] = {
+        {"speed along the heading", "m/s", {"speed"}},
+        {"heading, to starboard of the start", "rad", {"heading"}},
+        {"helm", "share of full throttle and rudder", {"throttle", "rudder"}},
+    };
+    for (size_t i = 0; i < sizeof charts / sizeof *charts; i++) {
+        char title[128], column[96];
+        snprintf(title, sizeof title, "%s: %s", name, charts[i].what);
+        ChartData data = chart_begin(title, charts[i].unit, hull, t);
+        for (int c = 0; c < 2 && charts[i].columns[c]; c++) {
+            snprintf(column, sizeof column, "%s.%s", name, charts[i].columns[c]);
+            chart_add(&data, hull, column, charts[i].columns[c]);
+        }
+        chart_end(out, &data);
+    }
+}
+
 static void write_body_charts(FILE *out, const ReportInput *input, const double *t) {
     char column[96];
     int count = skiff_body_count(input->sim);
@@ -298,6 +319,7 @@ static void write_body_charts(FILE *out, const ReportInput *input, const double 
         write_vector_chart(out, &input->hull, t, input->scene->def.bodies[i].name, "velocity", "m/s", "v");
         write_vector_chart(out, &input->hull, t, input->scene->def.bodies[i].name, "force of the fluid", "N",
                            "f");
+        write_drive_charts(out, &input->hull, t, input->scene->def.bodies[i].name);
     }
 }
 

@@ -137,6 +137,8 @@ static void usage_mistakes_exit_with_2(void **state) {
         {"run", "skiff run: the scene is missing\nTry 'skiff run --help'.\n"},
         {"run a.json", "skiff run: -o DIR is missing: the folder for the results\n"},
         {"run a.json b.json", "skiff run: one scene at a time: \"a.json\" and \"b.json\" are given\n"},
+        {"profile", "skiff profile: the folder is missing\nTry 'skiff profile --help'.\n"},
+        {"profile a b", "skiff profile: one folder at a time: \"a\" and \"b\" are given\n"},
         {"run a.json --frce", "skiff run: unknown option --frce, did you mean --force?\n"},
         {"run a.json --check 3", "skiff run: unknown option --check, did you mean --checkpoint-every?\n"},
         {"run a.json -z", "skiff run: unknown option -z\n"},
@@ -358,6 +360,9 @@ static void a_run_writes_its_results(void **state) {
     assert_int_equal(csv_column(&steps, "step"), 0);
     assert_true(csv_column(&steps, "step_ms") == steps.column_count - 1);
     csv_free(&steps);
+    expect("profile done", 0, "slowest steps", NULL);
+    expect("profile done --json", 0, "{\"steps\": 20, \"moves\": 0, \"mean_ms\": ", NULL);
+    expect("profile nowhere", ERR_INPUT, NULL, "nowhere/steps.csv: ");
 }
 
 static void an_existing_folder_is_refused(void **state) {

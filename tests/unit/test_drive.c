@@ -179,7 +179,8 @@ static void a_heading_is_found_and_held(void **state) {
     for (int k = 0; k < COUNT(wanted); k++) {
         Scene scene;
         scene_make(&scene);
-        scene.drive.hold_damping = 1.5f; /* critical for gain 2: 2 sqrt(2 I / T) = 1.76 */
+        scene.drive.hold_gain = 2.0f;
+        scene.drive.hold_damping = 1.5f; /* critical: 2 sqrt(2 I / T) = 1.76 */
         SkiffSim *sim = accept(&scene);
         set_heading(sim, wanted[k]);
         double highest = 0;
