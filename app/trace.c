@@ -28,8 +28,10 @@ static void write_slice(FILE *out, const char *name, double begin_us, double end
             STEP_TRACK, begin_us, end_us - begin_us);
 }
 
+/* A counter keeps its value until the next event: written where it changes. */
 static void write_counter(const Trace *trace, size_t row, const char *name, int column, double at_us) {
-    if (column >= 0)
+    const bool same = row > 0 && value_at(trace, row, column) == value_at(trace, row - 1, column);
+    if (column >= 0 && !same)
         fprintf(trace->out, ",\n{\"name\":\"%s\",\"ph\":\"C\",\"pid\":1,\"ts\":%.3f,\"args\":{\"%s\":%.0f}}",
                 name, at_us, name, value_at(trace, row, column));
 }
@@ -45,8 +47,10 @@ static double write_step(const Trace *trace, size_t row, double begin_us) {
             continue;
         double to_us = from_us + 1000 * value_at(trace, row, c);
         to_us = to_us < end_us ? to_us : end_us; /* a slice must lie inside its parent; digits are rounded */
-        write_slice(trace->out, trace->keys[c], from_us, to_us);
-        fputc('}', trace->out);
+        if (to_us > from_us) { /* a phase that does nothing takes no time to the digits of the table */
+            write_slice(trace->out, trace->keys[c], from_us, to_us);
+            fputc('}', trace->out);
+        }
         from_us = to_us;
     }
     if (value_at(trace, row, trace->moved) > 0)

@@ -5,7 +5,7 @@
  *   levelled, at full size. Or a propeller's: at its point, along the body's axis, as far as there is water.
  * - Steering as the authors: a torque about the vertical. Or a rudder: normal force of a plate,
  *   F = 1/2 rho A c |w| (w . n) n  with  c = 6.13 s / (s + 2.25),  s its aspect ratio (Fujii's formula, as in
- *   the MMG standard method [Yasukawa & Yoshimura 2015]); w is the water's velocity past it, with the jet of
+ *   the MMG standard method [Yasukawa2015]); w is the water's velocity past it, with the jet of
  *   the propeller by momentum theory: v_jet^2 = v^2 + 2 T / (rho A_p).
  * - Heading hold: rudder = gain * error - damping * rate, up to full rudder, or full rudder always as the
  *   authors.
@@ -48,22 +48,49 @@ static bool make_frame(Drive *drive, const SkiffGeometryDef *geometry, const cha
     return true;
 }
 
+/* Share of a point's surroundings that the hull fills, as its samples say. */
+static double solid_share(const SkiffSim *sim, int body, const double arm[3]) {
+    const BoundarySamples *samples = &sim->boundary.moving.samples;
+    double sum = 0.0;
+    for (uint32_t s = 0; s < samples->count; s++) {
+        double place[3];
+        dvec_from_float(place, samples->position[s]);
+        if (samples->object[s] == 1 + body)
+            sum += (double)samples->volume[s] *
+                   (double)kernel_w(&sim->kernel, (float)sqrt(dvec_distance_sq(place, arm)));
+    }
+    return sum;
+}
+
+/* False for a point inside the body. */
+static bool make_point(const SkiffSim *sim, const SkiffBodyDef *def, int index, const float place[3],
+                       DrivePoint *point) {
+    const Body *body = &sim->bodies[index];
+    float local[3];
+    geometry_turn(&def->geometry, place, point->arm);
+    for (int k = 0; k < 3; k++)
+        point->arm[k] += (double)def->geometry.translation[k] - body->position[k];
+    dvec_to_float(local, point->arm);
+    point->open = 1.0 - fmin(solid_share(sim, index, point->arm), 0.9);
+    return mesh_distance(&body->mesh, local, NULL) > 0.0f;
+}
+
 static bool make_drive(Drive *drive, const SkiffSim *sim, const SkiffBodyDef *def, const char *path,
                        Err *err) {
-    const Body *body = &sim->bodies[drive->body];
+    const SkiffDriveDef *own = &drive->def;
+    bool good = true;
     drive->def = *def->drive;
-    if (!params_check_drive(&drive->def, path, err))
+    if (!params_check_drive(own, path, err))
         return false;
-    if (body->free_axes == 0)
+    if (sim->bodies[drive->body].free_axes == 0)
         return err_add(err, ERR_INPUT, "%s: has no effect, since the body has no free axis", path);
-    geometry_turn(&def->geometry, drive->def.propeller, drive->propeller);
-    geometry_turn(&def->geometry, drive->def.rudder, drive->rudder);
-    for (int k = 0; k < 3; k++) {
-        const double shift = (double)def->geometry.translation[k] - body->position[k];
-        drive->propeller[k] += shift;
-        drive->rudder[k] += shift;
-    }
-    return make_frame(drive, &def->geometry, path, err);
+    if (!make_point(sim, def, drive->body, own->propeller, &drive->propeller) &&
+        own->thrust_at == SKIFF_THRUST_AT_PROPELLER)
+        good = err_add(err, ERR_INPUT, "%s.propeller: is inside the body, where no water comes", path);
+    if (!make_point(sim, def, drive->body, own->rudder, &drive->rudder) &&
+        own->steering == SKIFF_STEERING_RUDDER)
+        good = err_add(err, ERR_INPUT, "%s.rudder: is inside the body, where no water comes", path);
+    return make_frame(drive, &def->geometry, path, err) && good;
 }
 
 bool drives_make(SkiffSim *sim, const SkiffDef *def, Err *err) {
@@ -114,14 +141,14 @@ static WaterSums water_block(const SkiffSim *sim, uint32_t block, const float po
     return sums;
 }
 
-/* At the surface of a pool half of a point's surroundings is water: from there on downwards the share is 1.
- */
-static Water water_at(SkiffSim *sim, const double place[3]) {
+/* At the surface of a pool half of a point's open surroundings is water: from there on downwards the share is
+ * 1. `arm` leads from the centre of mass to the point, in the world. */
+static Water water_at(SkiffSim *sim, const Body *body, const double arm[3], double open) {
     const uint32_t blocks = particles_blocks(&sim->particles);
     WaterSums *sums = sim->sums.data, all = {0};
     float point[3];
     for (int k = 0; k < 3; k++)
-        point[k] = (float)(place[k] - sim->origin[k]);
+        point[k] = (float)(body->position[k] + arm[k] - sim->origin[k]);
 #pragma omp parallel for schedule(static) num_threads(sim->threads)
     for (uint32_t block = 0; block < blocks; block++)
         sums[block] = water_block(sim, block, point);
@@ -130,7 +157,7 @@ static Water water_at(SkiffSim *sim, const double place[3]) {
         for (int k = 0; k < 3; k++)
             all.momentum[k] += sums[block].momentum[k];
     }
-    Water water = {.share = fmin(2.0 * (double)sim->volume * all.weight, 1.0)};
+    Water water = {.share = fmin(2.0 * (double)sim->volume * all.weight / open, 1.0)};
     for (int k = 0; k < 3 && all.weight > 0.0; k++)
         water.velocity[k] = all.momentum[k] / all.weight;
     return water;
@@ -151,8 +178,8 @@ static Pose drive_pose(const Drive *drive, const Body *body) {
     quaternion_matrix(body->rotation, matrix);
     matrix_times((const double(*)[3])matrix, drive->forward, pose.forward);
     matrix_times((const double(*)[3])matrix, drive->starboard, pose.starboard);
-    matrix_times((const double(*)[3])matrix, drive->propeller, pose.propeller_arm);
-    matrix_times((const double(*)[3])matrix, drive->rudder, pose.rudder_arm);
+    matrix_times((const double(*)[3])matrix, drive->propeller.arm, pose.propeller_arm);
+    matrix_times((const double(*)[3])matrix, drive->rudder.arm, pose.rudder_arm);
     dvec_set(pose.level, pose.forward[0], 0.0, pose.forward[2]);
     dvec_normalize(pose.level);
     return pose;
@@ -199,9 +226,8 @@ static void flow_at(const Body *body, const double arm[3], const Water *water, d
 
 /* Thrust of the propeller; its jet (m/s) is what it adds to the water's speed astern. */
 static double propel(SkiffSim *sim, Drive *drive, Body *body, const Pose *pose) {
-    double place[3], flow[3], force[3];
-    dvec_add_scaled(place, body->position, 1.0, pose->propeller_arm);
-    const Water water = water_at(sim, place);
+    double flow[3], force[3];
+    const Water water = water_at(sim, body, pose->propeller_arm, drive->propeller.open);
     drive->water = water.share;
     drive->thrust *= water.share;
     for (int k = 0; k < 3; k++)
@@ -219,9 +245,8 @@ static double propel(SkiffSim *sim, Drive *drive, Body *body, const Pose *pose) 
 
 static void apply_rudder(SkiffSim *sim, Drive *drive, Body *body, const Pose *pose, double jet) {
     const SkiffDriveDef *def = &drive->def;
-    double place[3], flow[3], normal[3], force[3], torque[3];
-    dvec_add_scaled(place, body->position, 1.0, pose->rudder_arm);
-    const Water water = water_at(sim, place);
+    double flow[3], normal[3], force[3], torque[3];
+    const Water water = water_at(sim, body, pose->rudder_arm, drive->rudder.open);
     flow_at(body, pose->rudder_arm, &water, flow);
     dvec_add_scaled(flow, flow, -jet, pose->forward);
     const double angle = drive->rudder_position * (double)def->rudder_angle;

@@ -4,13 +4,18 @@
 
 #include "body.h"
 
+/* A propeller or rudder on a body. */
+typedef struct DrivePoint {
+    double arm[3]; /* m, from the centre of mass, body axes */
+    double open;   /* share of its surroundings that the hull leaves to the water */
+} DrivePoint;
+
 typedef struct Drive {
     SkiffDriveDef def;
     int body;
-    /* body axes, of which y is up at the start */
-    double forward[3], starboard[3]; /* unit, at right angles */
-    double propeller[3], rudder[3];  /* about the centre of mass, m */
-    double start_heading[2];         /* unit: x and z of `forward` at the start, seen from above */
+    double forward[3], starboard[3]; /* unit, at right angles, body axes */
+    DrivePoint propeller, rudder;
+    double start_heading[2]; /* unit: x and z of `forward` at the start, seen from above */
     /* state */
     SkiffControls controls;
     /* of the last step; also SkiffDrive */

@@ -146,7 +146,7 @@ static void the_frame_is_the_geometrys(void **state) {
     for (int k = 0; k < 3; k++) {
         assert_float_equal(drive->forward[k], forward[k], 1e-6);
         assert_float_equal(drive->starboard[k], starboard[k], 1e-6);
-        assert_float_equal(drive->propeller[k], propeller[k], 1e-6);
+        assert_float_equal(drive->propeller.arm[k], propeller[k], 1e-6);
     }
     assert_float_equal(skiff_drive(sim, 0).heading, 0.0, 1e-12); /* of the start, whatever it is */
     set(sim, 1, 0);
@@ -302,6 +302,15 @@ static void a_propeller_needs_water(void **state) {
     assert_float_equal(skiff_drive(sim, 0).thrust, 80.0, 0.0);
     skiff_destroy(sim);
 
+    scene.drive.propeller[0] = 0.53f; /* close to the stern, which leaves it half of the room */
+    sim = accept(&scene);
+    assert_true(sim->drives[0].propeller.open < 0.8);
+    set(sim, 1, 0);
+    run(sim, 1);
+    assert_float_equal(skiff_drive(sim, 0).water, 1.0, 0.0);
+    skiff_destroy(sim);
+
+    scene.drive.propeller[0] = 0.7f;
     scene.drive.propeller[1] = 0.45f; /* within the kernel's reach above the water: partly in it */
     sim = accept(&scene);
     set(sim, 1, 0);
@@ -424,6 +433,11 @@ static void bad_drives_are_refused(void **state) {
     scene.drive.wind[2] = NAN;
     refuse(&scene, "RigidBodies[0].drive.thrust: -1 is out of range, allowed is 0 to 1e+09 N\n"
                    "RigidBodies[0].drive.wind: nan is out of range, allowed is -1000 to 1000 m/s");
+    scene_make(&scene);
+    scene.drive.thrust_at = SKIFF_THRUST_AT_PROPELLER;
+    scene.drive.steering = SKIFF_STEERING_RUDDER;
+    refuse(&scene, "RigidBodies[0].drive.propeller: is inside the body, where no water comes\n"
+                   "RigidBodies[0].drive.rudder: is inside the body, where no water comes");
     scene_make(&scene);
     scene.drive.steering = 2;
     refuse(&scene, "RigidBodies[0].drive.steering: 2 is out of range, allowed is 0 to 1");
