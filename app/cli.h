@@ -8,12 +8,12 @@ enum { CLI_MAX_EDITS = 64 };
 
 /* What the command line said. Options that a command does not have keep their defaults. */
 typedef struct CliArgs {
-    const char *scene;                /* or folder; NULL where it may be left out and was */
-    const char *input;                /* --input; NULL: not given */
-    const char *output;               /* -o; NULL: not given */
-    double duration;                  /* s; NaN: the scene's */
-    int threads;                      /* 0: one for each core */
-    int simd;                         /* SkiffSimd */
+    const char *scene;  /* what a command is about, mostly a scene; NULL: left out where it may be */
+    const char *input;  /* --input; NULL: not given */
+    const char *output; /* -o; NULL: not given */
+    double duration;    /* s; NaN: the scene's */
+    int threads;        /* 0: one for each core */
+    int simd;           /* SkiffSimd */
     const char *edits[CLI_MAX_EDITS]; /* --set, in order */
     int edit_count;
     bool force, resume, quiet;
@@ -23,6 +23,9 @@ typedef struct CliArgs {
     int steps, windows;
     bool json, no_results;
     const char *results; /* NULL: the source tree's */
+    double edge;         /* rest make, d */
+    int seed;
+    double min[3], max[3]; /* rest cut, m; NaN: not given */
     bool help;
 } CliArgs;
 

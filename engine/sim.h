@@ -4,6 +4,7 @@
 
 #include "dfsph.h"
 #include "drive.h"
+#include "shape.h"
 
 typedef struct EmitBlock {
     SkiffBlockDef def;
@@ -34,7 +35,7 @@ struct SkiffSim {
     uint64_t def_hash; /* of everything a state must agree with */
     EmitBlock *blocks;
     int block_count;
-    Mesh tank; /* window-local; no triangles: no tank */
+    Shape tank; /* window-local; the fluid is inside */
     bool tank_open;
     Body *bodies;
     int body_count;
@@ -84,5 +85,8 @@ bool probes_make(SkiffSim *sim, const SkiffDef *def, Err *err);
 void probes_free(SkiffSim *sim);
 
 double timer_ms(void);
+
+/* `wanted`, or when that is 0 the number of physical cores this process may use. */
+int sim_threads(int wanted);
 
 #endif
