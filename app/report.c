@@ -78,6 +78,18 @@ static void write_header(FILE *out, const ReportInput *input) {
     }
 }
 
+/* Particles that appeared or disappeared, for each cause that there was. */
+static void write_causes(FILE *out, const json_t *counts, int count, const char *(*key)(int cause),
+                         const char *(*label)(int cause)) {
+    for (int i = 0; i < count; i++) {
+        char text[128];
+        const double particles = json_number_value(json_object_get(counts, key(i)));
+        snprintf(text, sizeof text, "particles %s", label(i));
+        if (particles > 0)
+            figure_count(out, particles, text);
+    }
+}
+
 static void write_figures(FILE *out, const json_t *summary) {
     fputs("<div class=\"figures\">", out);
     figure_count(out, number_at(summary, "particles", NULL, NULL), "particles");
@@ -95,8 +107,11 @@ static void write_figures(FILE *out, const json_t *summary) {
     figure_number(out, number_at(summary, "errors_percent", "density_max", "max"),
                   "% density error, largest");
     figure_number(out, number_at(summary, "peak_rss_mb", NULL, NULL), "MB of memory, peak");
-    if (number_at(summary, "removed", NULL, NULL) > 0)
-        figure_count(out, number_at(summary, "removed", NULL, NULL), "particles that left the domain");
+    if (number_at(summary, "moves", NULL, NULL) > 0)
+        figure_count(out, number_at(summary, "moves", NULL, NULL), "window moves");
+    write_causes(out, json_object_get(summary, "particles_in"), SKIFF_IN_COUNT, skiff_in_key, skiff_in_label);
+    write_causes(out, json_object_get(summary, "particles_out"), SKIFF_OUT_COUNT, skiff_out_key,
+                 skiff_out_label);
     fputs("</div>\n", out);
 }
 
@@ -221,6 +236,27 @@ static void write_probe_charts(FILE *out, const ReportInput *input, const double
     }
 }
 
+/* Nothing for a body without a drive. */
+static void write_drive_charts(FILE *out, const CsvTable *hull, const double *t, const char *name) {
+    static const struct {
+        const char *what, *unit, *columns[2];
+    } charts[] = {
+        {"speed along the heading", "m/s", {"speed"}},
+        {"heading, to starboard of the start", "rad", {"heading"}},
+        {"helm", "share of full throttle and rudder", {"throttle", "rudder"}},
+    };
+    for (size_t i = 0; i < sizeof charts / sizeof *charts; i++) {
+        char title[128], column[96];
+        snprintf(title, sizeof title, "%s: %s", name, charts[i].what);
+        ChartData data = chart_begin(title, charts[i].unit, hull, t);
+        for (int c = 0; c < 2 && charts[i].columns[c]; c++) {
+            snprintf(column, sizeof column, "%s.%s", name, charts[i].columns[c]);
+            chart_add(&data, hull, column, charts[i].columns[c]);
+        }
+        chart_end(out, &data);
+    }
+}
+
 static void write_body_charts(FILE *out, const ReportInput *input, const double *t) {
     char column[96];
     int count = skiff_body_count(input->sim);
@@ -239,6 +275,7 @@ static void write_body_charts(FILE *out, const ReportInput *input, const double 
         write_vector_chart(out, &input->hull, t, input->scene->def.bodies[i].name, "velocity", "m/s", "v");
         write_vector_chart(out, &input->hull, t, input->scene->def.bodies[i].name, "force of the fluid", "N",
                            "f");
+        write_drive_charts(out, &input->hull, t, input->scene->def.bodies[i].name);
     }
 }
 
@@ -327,9 +364,10 @@ static void write_footer(FILE *out, const ReportInput *input) {
             "<code>%s</code> (equal states have equal hashes, whatever the number of threads).</p>\n",
             1000 * number_at(input->summary, "time_step", NULL, NULL), text_at(machine, "version"),
             text_at(machine, "commit"), text_at(machine, "compiler"), text_at(input->summary, "state_hash"));
-    fputs("<p class=\"soft\">Numbers: steps.csv, hull.csv, probes.csv and summary.json beside this file. "
-          "Bands around the curves "
-          "show the range within the interval of a point.</p>\n",
+    fputs("<p class=\"soft\">Numbers: steps.csv, ledger.csv, hull.csv, probes.csv and summary.json beside this "
+          "file; trace.json opens in Perfetto. Bands around the curves show the range within the interval of a "
+          "point.</p>
+",
           out);
     html_end(out);
 }

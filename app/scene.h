@@ -2,6 +2,8 @@
 #ifndef SKIFF_APP_SCENE_H
 #define SKIFF_APP_SCENE_H
 
+#include "script.h"
+
 #include "engine/skiff.h"
 
 #include <jansson.h>
@@ -11,7 +13,10 @@ typedef struct Scene {
     const char *title; /* "" where there is none */
     double duration;   /* s, from def.start_time */
     double probe_rate; /* Hz; 0: every step */
-    SkiffDef def;      /* strings and arrays belong to the scene */
+    const char *input; /* input file, as a path that can be opened; NULL: none */
+    const ScriptKey *keys;
+    int key_count;
+    SkiffDef def; /* strings and arrays belong to the scene */
     struct SceneContent *content;
 } Scene;
 

@@ -53,26 +53,29 @@ static void check_domain(void *object, Problems *problems) {
                       problems);
 }
 
-static bool param_row(int index, Field *field) {
+/* Row of a field that stands in one of the engine's own lists, in a struct `base` bytes into the object. */
+static Field info_row(const SkiffParamInfo *info, size_t base) {
     static const FieldType types[] = {[SKIFF_FLOAT] = FIELD_FLOAT,
                                       [SKIFF_INT] = FIELD_INT,
                                       [SKIFF_BOOL] = FIELD_BOOL,
                                       [SKIFF_VEC3] = FIELD_VEC3,
                                       [SKIFF_ENUM] = FIELD_ENUM};
+    return (Field){.key = info->key,
+                   .type = types[info->type],
+                   .offset = base + info->offset,
+                   .min = info->min,
+                   .max = info->max,
+                   .unit = info->unit,
+                   .names = info->names,
+                   .help = info->help};
+}
+
+static bool param_row(int index, Field *field) {
     int count;
     const SkiffParamInfo *infos = skiff_param_infos(&count);
-    if (index >= count)
-        return false;
-    const SkiffParamInfo *info = &infos[index];
-    *field = (Field){.key = info->key,
-                     .type = types[info->type],
-                     .offset = offsetof(SceneConfiguration, params) + info->offset,
-                     .min = info->min,
-                     .max = info->max,
-                     .unit = info->unit,
-                     .names = info->names,
-                     .help = info->help};
-    return true;
+    if (index < count)
+        *field = info_row(&infos[index], offsetof(SceneConfiguration, params));
+    return index < count;
 }
 
 #define ROW(field_type, struct_type, member, json_key)                                                       \
@@ -397,6 +400,25 @@ static const ObjectType block_type = {.help = "A box of fluid, emitted once or p
 
 /* ---- RigidBodies ---- */
 
+static void init_drive(void *object) {
+    *(SkiffDriveDef *)object = skiff_drive_default();
+}
+
+static bool drive_row(int index, Field *field) {
+    int count;
+    const SkiffParamInfo *infos = skiff_drive_infos(&count);
+    if (index < count)
+        *field = info_row(&infos[index], 0);
+    return index < count;
+}
+
+static const ObjectType drive_type = {
+    .help = "What drives and steers a body. Points and directions are in the geometry's own frame, as its "
+            "vertices are",
+    .more = drive_row,
+    .size = sizeof(SkiffDriveDef),
+    .init = init_drive};
+
 enum { GROUP_SHAPE = 1, GROUP_WEIGHT = 2 };
 
 static void init_body(void *object) {
@@ -467,6 +489,8 @@ static const Field body_fields[] = {
      .help = "Axes along and about which a dynamic body can move; absent: all"},
     {ROW(FIELD_DOUBLE, SceneBody, release_time, "releaseTime"), DURATION,
      .help = "A dynamic body is held until then"},
+    {ROW(FIELD_OBJECT, SceneBody, drive, "drive"), .flags = FIELD_NULLABLE, .object = &drive_type,
+     .help = "Propulsion and steering; absent: none"},
 };
 
 static const FieldRule body_rules[] = {{"rotationAxis|rotationAngle", check_body_rotation},
@@ -542,10 +566,51 @@ static const ObjectType probe_type = {.help = "A measurement, written to probes.
                                       .rule_count = COUNT(probe_rules),
                                       .variant_key = "type"};
 
+/* ---- Keys ---- */
+
+enum { LEVERS = 1 << SCRIPT_KEY_THROTTLE | 1 << SCRIPT_KEY_RUDDER, CAMERA = 1 << SCRIPT_KEY_CAMERA };
+
+static void init_key(void *object) {
+    *(ScriptKey *)object = (ScriptKey){.value = 1};
+}
+
+static const Field key_fields[] = {
+    {ROW(FIELD_NAME, ScriptKey, key, "key"), .flags = FIELD_REQUIRED,
+     .help = "What `press` and `release` in input files call it"},
+    {ROW(FIELD_ENUM, ScriptKey, action, "action"), .names = SCRIPT_ACTIONS, .flags = FIELD_REQUIRED,
+     .help = "What it does: throttle and rudder while it is held, camera when it is pressed"},
+    {ROW(FIELD_FLOAT, ScriptKey, value, "value"), .min = -1, .max = 1, .variants = LEVERS,
+     .help = "Throttle (ahead is above 0) or rudder (to starboard is above 0)"},
+    {ROW(FIELD_NAME, ScriptKey, camera, "camera"), .flags = FIELD_REQUIRED, .variants = CAMERA,
+     .help = "Name of the camera"},
+};
+
+static const ObjectType key_type = {.help = "A key and what it does",
+                                    .fields = key_fields,
+                                    .field_count = COUNT(key_fields),
+                                    .size = sizeof(ScriptKey),
+                                    .init = init_key,
+                                    .variant_key = "action"};
+
 /* ---- The file ---- */
 
 static void init_file(void *object) {
-    *(SceneFile *)object = (SceneFile){.version = 1, .title = "", .description = ""};
+    SceneFile *file = object;
+    *file = (SceneFile){.version = 1, .title = "", .description = ""};
+    file->keys.items = (void *)(uintptr_t)script_default_keys(&file->keys.count);
+}
+
+static void check_keys(void *object, Problems *problems) {
+    const SceneFile *file = object;
+    const ScriptKey *keys = file->keys.items;
+    for (int i = 0; i < file->keys.count; i++)
+        for (int j = 0; j < i; j++)
+            if (strcmp(keys[i].key, keys[j].key) == 0) {
+                const size_t mark = problems_enter(problems, "Keys");
+                problems_enter_index(problems, (size_t)i);
+                problems_add(problems, "key %s is bound by Keys[%d] already", keys[i].key, j);
+                problems_leave(problems, mark);
+            }
 }
 
 static const Field file_fields[] = {
@@ -564,10 +629,18 @@ static const Field file_fields[] = {
      .help = "Solids in the fluid; they do not touch each other or the tank"},
     {ROW(FIELD_LIST, SceneFile, probes, "Probes"), .max = 10000, .object = &probe_type,
      .help = "Measurements"},
+    {ROW(FIELD_FILE, SceneFile, input, "input"), .flags = FIELD_NULLABLE,
+     .help = "Input file that drives, relative to the scene; `skiff run --input` takes its place"},
+    {ROW(FIELD_LIST, SceneFile, keys, "Keys"), .max = SCRIPT_MAX_KEYS, .object = &key_type,
+     .help = "Keys that input files can press; absent: w s a d, z q and the arrows"},
 };
+
+static const FieldRule file_rules[] = {{"Keys", check_keys}};
 
 const ObjectType scene_file_type = {.help = "A Skiff scene",
                                     .fields = file_fields,
                                     .field_count = COUNT(file_fields),
                                     .size = sizeof(SceneFile),
-                                    .init = init_file};
+                                    .init = init_file,
+                                    .rules = file_rules,
+                                    .rule_count = COUNT(file_rules)};

@@ -327,6 +327,10 @@ static uint64_t hash_def(const SkiffSim *sim, const SkiffDef *def) {
         XXH3_64bits_update(&state, &def->blocks[b].time, 2 * sizeof(double));
         XXH3_64bits_update(&state, &def->blocks[b].repeat, sizeof(int));
     }
+    for (int d = 0; d < sim->drive_count; d++) { /* all its fields have four bytes: there is no padding */
+        XXH3_64bits_update(&state, &sim->drives[d].body, sizeof(int));
+        XXH3_64bits_update(&state, &sim->drives[d].def, sizeof(SkiffDriveDef));
+    }
     XXH3_64bits_update(&state, &sim->domain, sizeof sim->domain);
     return XXH3_64bits_digest(&state);
 }
@@ -365,12 +369,12 @@ static bool build(SkiffSim *sim, const SkiffDef *def, Err *err) {
     good = make_tank(sim, def, err);
     for (sim->body_count = 0; sim->body_count < def->body_count; sim->body_count++)
         good = make_body(sim, def, sim->body_count, err) && good;
-    good = good && check_overlaps(sim, err) && choose_domain(sim, def, err) &&
+    good = good && drives_make(sim, def, err) && check_overlaps(sim, err) && choose_domain(sim, def, err) &&
            boundary_weigh(&sim->boundary.fixed, &sim->kernel, err) &&
            sim_reserve(sim, (uint32_t)particles, err) &&
            boundary_place(&sim->boundary, sim->bodies, sim->body_count, sim->origin, sim->kernel.support,
                           sim->threads, err) &&
-           block_emit(sim, &sim->stats.emitted, err) && probes_make(sim, def, err);
+           block_emit(sim, &sim->stats.particles_in[SKIFF_IN_EMITTED], err) && probes_make(sim, def, err);
     if (!good)
         return false;
     sim->def_hash = hash_def(sim, def);
@@ -403,6 +407,7 @@ void skiff_destroy(SkiffSim *sim) {
     for (int b = 0; b < sim->body_count; b++)
         body_free(&sim->bodies[b]);
     free(sim->bodies);
+    free(sim->drives);
     free(sim->blocks);
     shape_free(&sim->tank);
     particles_free(&sim->particles);

@@ -2,6 +2,7 @@
 #ifndef SKIFF_SIM_H
 #define SKIFF_SIM_H
 
+#include "drive.h"
 #include "rest.h"
 #include "shape.h"
 
@@ -38,6 +39,8 @@ struct SkiffSim {
     bool tank_open;
     Body *bodies;
     int body_count;
+    Drive *drives;
+    int drive_count;
     Probe *probes;
     int probe_count;
     uint32_t probe_channels;
@@ -64,7 +67,7 @@ struct SkiffSim {
     SkiffFill fill;
 
     /* advance */
-    Buffer sums; /* [blocks] partial sums of the statistics */
+    Buffer sums; /* [blocks] partial sums: of the statistics, of the water at a propeller */
     SkiffStats stats;
 };
 
@@ -79,6 +82,11 @@ double block_particles(const SkiffBlockDef *def, float spacing, double counts[3]
 void forces_apply(SkiffSim *sim, const DfsphProblem *problem);
 /* The fluid's part, but for friction. Uses the solver's vectors between its solves. */
 void forces_apply_fluid(const DfsphProblem *problem, Dfsph *dfsph);
+
+/* Drives of the bodies, which stand at their start. */
+bool drives_make(SkiffSim *sim, const SkiffDef *def, Err *err);
+/* Thrust, steering and extra drag of one step, added to what pushes the bodies. */
+void drives_apply(SkiffSim *sim);
 
 bool probes_make(SkiffSim *sim, const SkiffDef *def, Err *err);
 void probes_free(SkiffSim *sim);

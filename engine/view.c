@@ -114,6 +114,11 @@ uint64_t skiff_hash(const SkiffSim *sim) {
         XXH3_64bits_update(&state, body->velocity, sizeof body->velocity);
         XXH3_64bits_update(&state, body->angular_velocity, sizeof body->angular_velocity);
     }
+    for (int d = 0; d < sim->drive_count; d++) {
+        double scalars[DRIVE_SCALARS];
+        drive_to_scalars(&sim->drives[d], scalars);
+        XXH3_64bits_update(&state, scalars, sizeof scalars);
+    }
     return XXH3_64bits_digest(&state);
 }
 

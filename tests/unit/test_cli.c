@@ -137,6 +137,8 @@ static void usage_mistakes_exit_with_2(void **state) {
         {"run", "skiff run: the scene is missing\nTry 'skiff run --help'.\n"},
         {"run a.json", "skiff run: -o DIR is missing: the folder for the results\n"},
         {"run a.json b.json", "skiff run: one scene at a time: \"a.json\" and \"b.json\" are given\n"},
+        {"profile", "skiff profile: the folder is missing\nTry 'skiff profile --help'.\n"},
+        {"profile a b", "skiff profile: one folder at a time: \"a\" and \"b\" are given\n"},
         {"run a.json --frce", "skiff run: unknown option --frce, did you mean --force?\n"},
         {"run a.json --check 3", "skiff run: unknown option --check, did you mean --checkpoint-every?\n"},
         {"run a.json -z", "skiff run: unknown option -z\n"},
@@ -341,14 +343,16 @@ static void assert_same_end(const char *a, const char *b) {
     json_decref(x);
     json_decref(y);
     assert_same_steps(in(a, "steps.csv"), in(b, "steps.csv"));
+    assert_same_file(in(a, "ledger.csv"), in(b, "ledger.csv"));
     assert_same_file(in(a, "hull.csv"), in(b, "hull.csv"));
     assert_same_file(in(a, "probes.csv"), in(b, "probes.csv"));
 }
 
 static void a_run_writes_its_results(void **state) {
     (void)state;
-    static const char *const names[] = {"steps.csv",  "hull.csv",    "probes.csv", "summary.json",
-                                        "scene.json", "report.html", "state.skiff"};
+    static const char *const names[] = {"steps.csv",   "ledger.csv",   "hull.csv",
+                                        "probes.csv",  "summary.json", "scene.json",
+                                        "report.html", "state.skiff",  "trace.json"};
     expect("run " SMALL " -o done --duration 0.06", 0, NULL, "finished at t = 0.06 s, step 20");
     for (int i = 0; i < COUNT(names); i++)
         assert_true(exists(in("done", names[i])));
@@ -372,6 +376,9 @@ static void a_run_writes_its_results(void **state) {
     assert_int_equal(csv_column(&steps, "step"), 0);
     assert_true(csv_column(&steps, "step_ms") == steps.column_count - 1);
     csv_free(&steps);
+    expect("profile done", 0, "slowest steps", NULL);
+    expect("profile done --json", 0, "{\"steps\": 20, \"moves\": 0, \"mean_ms\": ", NULL);
+    expect("profile nowhere", ERR_INPUT, NULL, "nowhere/steps.csv: ");
 }
 
 static void an_existing_folder_is_refused(void **state) {
@@ -507,6 +514,86 @@ static void a_blow_up_exits_with_5(void **state) {
     assert_string_equal(json_string_value(json_object_get(summary, "status")), "diverged");
     assert_true(strlen(json_string_value(json_object_get(summary, "message"))) > 0);
     json_decref(summary);
+}
+
+/* ---- Driving ---- */
+
+/* A raft in a small tank; `drive` may be empty. */
+static void write_raft(const char *path, const char *drive) {
+    char text[2048];
+    snprintf(
+        text, sizeof text,
+        "{\"version\": 1, \"input\": \"scene.input\", \"Configuration\": {\"duration\": 0.12},"
+        " \"Tank\": {\"type\": \"box\", \"min\": [-0.4, 0, -0.3], \"max\": [0.4, 0.6, 0.3], \"open\": true},"
+        " \"FluidBlocks\": [{\"start\": [-0.375, 0.025, -0.275], \"end\": [0.375, 0.175, 0.275]}],"
+        " \"RigidBodies\": [{\"name\": \"raft\", \"box\": [0.3, 0.1, 0.2], \"density\": 500,"
+        " \"translation\": [0, 0.2, 0], \"isDynamic\": true%s}]}",
+        drive);
+    write_text(path, text);
+    write_text("scene.input", "0.03 throttle 0.5\n");
+}
+
+static const char raft_drive[] = ", \"drive\": {\"thrust\": 10, \"steeringTorque\": 0.5}";
+static const char raft_input[] =
+    "0 press w\n0.02 heading 20\n0.05 press d\n0.08 release d\n0.1 heading -10\n";
+
+static void a_driven_run_replays_and_resumes(void **state) {
+    (void)state;
+    write_raft("raft.json", raft_drive);
+    write_text("raft.input", raft_input);
+    expect("run raft.json -o sailed -q --input raft.input --threads 1", 0, NULL, "");
+    char *text = read_text("sailed/run.input");
+    assert_non_null(strstr(text, " heading 20\n"));
+    assert_non_null(strstr(text, " rudder 1\n")); /* d is bound to it */
+    free(text);
+    assert_same_file("sailed/script.input", "raft.input");
+    /* what was driven, driven again */
+    expect("run raft.json -o replayed -q --input sailed/run.input --threads 2", 0, NULL, "");
+    assert_same_file("sailed/run.input", "replayed/run.input");
+    /* 40 steps are 20 and 20: the folder knows its input */
+    expect("run raft.json -o halves -q --input raft.input --duration 0.06", 0, NULL, "comes after the end");
+    write_text("raft.input", "");
+    expect("run raft.json -o halves -q --resume", 0, NULL, "");
+    static const char *const others[] = {"replayed", "halves"};
+    for (int i = 0; i < COUNT(others); i++) {
+        json_t *x = summary_of("sailed"), *y = summary_of(others[i]);
+        assert_string_equal(json_string_value(json_object_get(x, "state_hash")),
+                            json_string_value(json_object_get(y, "state_hash")));
+        json_decref(x);
+        json_decref(y);
+        assert_same_steps("sailed/steps.csv", in(others[i], "steps.csv"));
+        assert_same_file("sailed/hull.csv", in(others[i], "hull.csv"));
+    }
+    assert_same_file("sailed/run.input", "halves/run.input");
+    /* the scene's own input, and a raft without one, go elsewhere */
+    expect("run raft.json -o own -q", 0, NULL, "");
+    text = read_text("own/run.input");
+    assert_non_null(strstr(text, " throttle 0.5\n"));
+    free(text);
+}
+
+static void input_that_cannot_be_right_is_refused(void **state) {
+    (void)state;
+    write_raft("raft.json", raft_drive);
+    write_raft("drift.json", "");
+    write_text("raft.input", raft_input);
+    write_text("bad.input", "1 thottle 1\n0 rudder 3\n");
+    expect("run raft.json -o never --input bad.input", ERR_INPUT, NULL,
+           "bad.input:1: unknown command thottle, did you mean throttle?\n"
+           "bad.input:2: 0 s is before the line above, which is at 1 s\n"
+           "bad.input:2: rudder: expected");
+    expect("run raft.json -o never --input none.input", ERR_INPUT, NULL, "none.input: ");
+    assert_false(exists("never"));
+    expect("run drift.json -o never --input raft.input", ERR_INPUT, NULL,
+           "raft.input:1: no body of the scene has a drive");
+    /* the past cannot change, the future can */
+    expect("run raft.json -o past -q --input raft.input --duration 0.06", 0, NULL, "");
+    write_text("other.input", "0 press w\n0.02 heading 21\n");
+    expect("run raft.json -o past -q --resume --input other.input", ERR_INPUT, NULL,
+           "other.input: differs from past/script.input near line 2, before the checkpoint");
+    write_text("other.input", "0 press w\n0.02 heading 20\n0.05 press d\n0.07 throttle 0\n");
+    expect("run raft.json -o past -q --resume --input other.input", 0, NULL, "");
+    assert_same_file("past/script.input", "other.input");
 }
 
 /* ---- Benchmarks ---- */
@@ -660,6 +747,8 @@ int main(void) {
         cmocka_unit_test(a_resume_that_cannot_be_right_is_refused),
         cmocka_unit_test(signals_end_a_run_with_a_checkpoint),
         cmocka_unit_test(a_blow_up_exits_with_5),
+        cmocka_unit_test(a_driven_run_replays_and_resumes),
+        cmocka_unit_test(input_that_cannot_be_right_is_refused),
         cmocka_unit_test(bench_prints_one_line_of_json),
         cmocka_unit_test(bench_keeps_rows),
         cmocka_unit_test(a_full_disk_is_noticed),
