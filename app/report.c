@@ -364,11 +364,11 @@ static void write_footer(FILE *out, const ReportInput *input) {
             "<code>%s</code> (equal states have equal hashes, whatever the number of threads).</p>\n",
             1000 * number_at(input->summary, "time_step", NULL, NULL), text_at(machine, "version"),
             text_at(machine, "commit"), text_at(machine, "compiler"), text_at(input->summary, "state_hash"));
-    fputs("<p class=\"soft\">Numbers: steps.csv, ledger.csv, hull.csv, probes.csv and summary.json beside this "
-          "file; trace.json opens in Perfetto. Bands around the curves show the range within the interval of a "
-          "point.</p>
-",
-          out);
+    fputs(
+        "<p class=\"soft\">Numbers: steps.csv, ledger.csv, hull.csv, probes.csv and summary.json beside this "
+        "file; trace.json opens in Perfetto. Bands around the curves show the range within the interval of a "
+        "point.</p>\n",
+        out);
     html_end(out);
 }
 
