@@ -266,7 +266,8 @@ bool rest_fill(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *
     good = good && (all || rest_settle(sim, fill, err));
     if (good)
         take_over(sim, request->birth, fill);
-    good = good && (!all || rest_settle_all(sim, first_id, fill, err));
+    good = good && (!all || (request->fitted != NULL && fill->candidates == 0) ||
+                    rest_settle_all(sim, first_id, fill, err));
     if (!good)
         undo(sim, first_id);
     fill->load_ms = gathered - start;
