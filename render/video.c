@@ -199,7 +199,7 @@ bool gfx_video_add(GfxVideo *video, const uint8_t *rgb, Err *err) {
             int fault = errno;
             close_all(video);
             wait_for_child(video); /* it has ended or will, with its input closed */
-            return report(video, fault == EPIPE ? "stopped" : strerror(fault), err);
+            return report(video, fault == EPIPE || fault == ECONNRESET ? "stopped" : strerror(fault), err);
         }
         done += n > 0 ? (size_t)n : 0;
     }
