@@ -6,9 +6,17 @@
 
 enum { CLI_MAX_EDITS = 64 };
 
+/* What it said about pictures. -1, 0 and NULL: nothing. */
+typedef struct CliPictures {
+    bool render, no_render, video;
+    int look, field, hud, fade, gl, export; /* position in the option's list of words */
+    int fps, supersample, save_particles;
+    const char *size, *camera, *frames;
+} CliPictures;
+
 /* What the command line said. Options that a command does not have keep their defaults. */
 typedef struct CliArgs {
-    const char *scene;                /* NULL where it may be left out and was */
+    const char *scene;                /* or the folder of `render`; NULL where it may be left out and was */
     const char *output;               /* -o; NULL: not given */
     double duration;                  /* s; NaN: the scene's */
     int threads;                      /* 0: one for each core */
@@ -22,6 +30,7 @@ typedef struct CliArgs {
     int steps, windows;
     bool json, no_results;
     const char *results; /* NULL: the source tree's */
+    CliPictures pictures;
     bool help;
 } CliArgs;
 

@@ -132,6 +132,7 @@ static void fill_def(Scene *scene) {
     scene->title = file->title;
     scene->duration = configuration->duration;
     scene->probe_rate = configuration->probe_rate;
+    scene->render = file->render;
 }
 
 /* ---- Reading ---- */

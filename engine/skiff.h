@@ -232,6 +232,10 @@ void skiff_body_push(SkiffSim *sim, int index, const double force[3], const doub
 void skiff_body_mesh(const SkiffSim *sim, int index, const float (**vertices)[3], uint32_t *vertex_count,
                      const uint32_t (**triangles)[3], uint32_t *triangle_count);
 
+/* The surface of the tank, window-local; no triangles where there is none. Owned by the simulation. */
+void skiff_tank_mesh(const SkiffSim *sim, const float (**vertices)[3], uint32_t *vertex_count,
+                     const uint32_t (**triangles)[3], uint32_t *triangle_count);
+
 enum {
 #define PHASE(id, key, label) SKIFF_PHASE_##id,
 #include "phases.inl"

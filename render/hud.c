@@ -104,7 +104,7 @@ static void group_digits(double value, char *out, size_t size) {
 
 /* ---- Time and counts ---- */
 
-enum { LINES = 4, LINE_SIZE = 64 };
+enum { LINES = 3, LINE_SIZE = 64 };
 
 static void draw_counts(const Canvas *canvas, const GfxHudValues *values) {
     char lines[LINES][LINE_SIZE], clock[LINE_SIZE] = "";
@@ -119,8 +119,6 @@ static void draw_counts(const Canvas *canvas, const GfxHudValues *values) {
                  values->moves == 1 ? "" : "s");
     if (!isnan(values->step_ms))
         snprintf(lines[count++], LINE_SIZE, "%.1f ms a step", values->step_ms);
-    if (values->camera)
-        snprintf(lines[count++], LINE_SIZE, "camera %.40s", values->camera);
     if (!isnan(values->time))
         snprintf(clock, sizeof clock, "%.2f s", values->time);
     if (count == 0 && !*clock)

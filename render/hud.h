@@ -10,7 +10,6 @@ typedef struct GfxHudValues {
     double speed;            /* m/s, of the boat over ground */
     double throttle, rudder; /* -1..1; rudder: positive to starboard */
     const char *keys;        /* names of the pressed keys, separated by blanks; "": none is pressed */
-    const char *camera;      /* its name */
     double particles;        /* number of */
     long moves;              /* of the window, so far */
     double step_ms; /* wall time of a step: differs between runs, and with it the bytes of the picture */

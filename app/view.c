@@ -1,0 +1,842 @@
+/* From a simulation, or from saved frames, to pictures: which frames are due, where the camera is, what
+ * fades, what is white, what stands in the corner; the renderer does the rest.
+ *
+ * Frame n shows the time start + (n - 1) / fps, whatever the step. A drawn frame depends on the scene, the
+ * options and the frames before it, not on the wall clock, unless the figures include it (--hud timing).
+ *
+ * Foam and smoothed cameras remember the frames before; after --resume they begin anew. */
+#include "view.h"
+
+#include "foam.h"
+#include "nearest.h"
+
+#include "engine/base/file.h"
+#include "engine/base/log.h"
+#include "render/gfx.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { PATH_SIZE = 4096, QUEUE_LENGTH = 4, EDGE_MAP_MAX = 512 };
+static const double time_tolerance = 1e-7; /* s: two times this close are the same */
+
+typedef struct ViewCamera {
+    const char *name;
+    int body; /* that is followed; -1: none */
+    GfxCameraDef def;
+    GfxCameraState state;
+} ViewCamera;
+
+/* A sequence of moments: number n lies at start + (n - 1) / rate. */
+typedef struct Sequence {
+    int rate; /* 1/s; 0: none */
+    int next, last;
+} Sequence;
+
+struct View {
+    ViewOptions options;
+    const Scene *scene;
+    char output[PATH_SIZE];
+    double start; /* s */
+    Sequence draw, save;
+    int drawn;
+
+    /* the picture */
+    Gfx *gfx;
+    GfxHud *hud;
+    uint8_t *rgb;
+    GfxWriter *writer;
+    GfxVideo *video;
+
+    /* what is in it */
+    ViewCamera *cameras;
+    int camera_count, camera;
+    GfxInstance *instances; /* bodies, then the tank */
+    uint32_t instance_count;
+    int hero; /* the body that cameras follow and whose speed is shown; -1: none */
+    float *edge_map;
+    uint32_t edge_size[2];
+    float edge_min[2], edge_max[2];
+    bool has_tank;
+    float floor; /* local y of the lowest water at the start, or of the tank */
+
+    /* the moment */
+    Frame frame;
+    FrameBody *before; /* poses at the beginning of the step */
+    double before_time, step_ms;
+    Foam *foam;
+    float *scalars; /* fade, foam and field of each particle */
+    uint32_t scalar_capacity;
+};
+
+ViewControls view_controls_none(void) {
+    return (ViewControls){.driven = {.throttle = NAN, .rudder = NAN}, .step_ms = NAN};
+}
+
+/* ---- What is looked at ---- */
+
+typedef struct Bounds {
+    double min[3], max[3];
+} Bounds;
+
+static const Bounds no_bounds = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+
+static void grow(Bounds *bounds, const float point[3]) {
+    for (int k = 0; k < 3; k++) {
+        bounds->min[k] = fmin(bounds->min[k], (double)point[k]);
+        bounds->max[k] = fmax(bounds->max[k], (double)point[k]);
+    }
+}
+
+static Bounds bounds_of_points(const float (*points)[3], uint32_t count) {
+    Bounds bounds = no_bounds;
+    for (uint32_t i = 0; i < count; i++)
+        grow(&bounds, points[i]);
+    return bounds;
+}
+
+static Bounds bounds_of_water(const Frame *frame) {
+    Bounds bounds = no_bounds;
+    for (uint32_t i = 0; i < frame->live; i++)
+        grow(&bounds, frame->position[i]);
+    return bounds;
+}
+
+/* The tank, else the water, local. */
+static Bounds bounds_of_scene(const SkiffSim *sim, const Frame *frame) {
+    const float(*vertices)[3];
+    const uint32_t(*triangles)[3];
+    uint32_t vertex_count, triangle_count;
+    skiff_tank_mesh(sim, &vertices, &vertex_count, &triangles, &triangle_count);
+    return triangle_count > 0 ? bounds_of_points(vertices, vertex_count) : bounds_of_water(frame);
+}
+
+/* The first body that can move. */
+static int find_hero(const SkiffDef *def) {
+    for (int i = 0; i < def->body_count; i++)
+        if (def->bodies[i].free_axes != 0)
+            return i;
+    return def->body_count > 0 ? 0 : -1;
+}
+
+static int find_body(const SkiffDef *def, const char *name) {
+    for (int i = 0; i < def->body_count; i++)
+        if (strcmp(def->bodies[i].name, name) == 0)
+            return i;
+    return -1;
+}
+
+static bool unknown_body(const View *view, const char *list, int index, const char *name, Err *err) {
+    const SkiffDef *def = &view->scene->def;
+    Nearest nearest = nearest_begin(name);
+    for (int i = 0; i < def->body_count; i++)
+        nearest_offer(&nearest, def->bodies[i].name);
+    const char *best = nearest_result(&nearest);
+    return err_set(err, ERR_INPUT, "%s: Render.%s[%d]: there is no body \"%s\"%s%s%s", view->scene->file,
+                   list, index, name, best ? ", did you mean " : "", best ? best : "", best ? "?" : "");
+}
+
+/* ---- Cameras ---- */
+
+/* Where the body's bow points at the start, world axes. */
+static void bow_of(const SkiffDef *def, int body, double bow[3]) {
+    (void)def;
+    (void)body;
+    bow[0] = 1;
+    bow[1] = bow[2] = 0;
+}
+
+static void keep(double *value, float given) {
+    if (!isnan(given))
+        *value = (double)given;
+}
+
+static void keep3(double value[3], const float given[3]) {
+    for (int k = 0; k < 3 && !isnan(given[0]); k++)
+        value[k] = (double)given[k];
+}
+
+/* Lengths that suit a body: `length` horizontal, `top` above its centre. */
+static void suit_body(GfxCameraDef *def, const SkiffSim *sim, int body) {
+    const float(*vertices)[3];
+    const uint32_t(*triangles)[3];
+    uint32_t vertex_count, triangle_count;
+    skiff_body_mesh(sim, body, &vertices, &vertex_count, &triangles, &triangle_count);
+    Bounds bounds = bounds_of_points(vertices, vertex_count);
+    double length = fmax(bounds.max[0] - bounds.min[0], bounds.max[2] - bounds.min[2]);
+    SkiffBody pose = skiff_body(sim, body);
+    memcpy(def->target, pose.position, sizeof def->target);
+    def->distance = (def->kind == GFX_CAMERA_TOP ? 3.2 : 1.75) * length;
+    def->height = 0.62 * length;
+    def->look_up = 0.05 * length;
+    memcpy(def->eye, pose.position, sizeof def->eye);
+    if (def->kind == GFX_CAMERA_BOW) {
+        def->eye[0] = def->eye[2] = 0;
+        def->eye[1] = bounds.max[1] + 0.08 * length;
+    } else {
+        def->eye[0] -= 1.4 * length;
+        def->eye[1] += 0.8 * length;
+        def->eye[2] += 1.8 * length;
+    }
+}
+
+/* Everything in the picture, seen from in front and above. */
+static void suit_scene(GfxCameraDef *def, const SkiffSim *sim, const Frame *frame, double aspect) {
+    static const double from[3] = {0.35, 0.42, 0.84}; /* length 1.0 */
+    Bounds bounds = bounds_of_scene(sim, frame);
+    double radius = 0;
+    for (int k = 0; k < 3; k++) {
+        double half = fmax(0.5 * (bounds.max[k] - bounds.min[k]), 0.0);
+        def->target[k] = frame->origin[k] + (isfinite(half) ? bounds.min[k] + half : 0);
+        radius += isfinite(half) ? half * half : 1;
+    }
+    radius = sqrt(radius);
+    double half_fov = 0.5 * def->fov_deg * 3.14159265358979323846 / 180;
+    if (aspect < 1)
+        half_fov = atan(tan(half_fov) * aspect);
+    double distance = 0.92 * radius / sin(half_fov); /* corners of a box rarely reach its sphere */
+    for (int k = 0; k < 3; k++)
+        def->eye[k] = def->target[k] + distance * from[k];
+    def->distance = distance;
+    def->height = distance * from[1];
+    def->look_up = 0;
+}
+
+static bool add_camera(View *view, const SceneCamera *camera, int index, const SkiffSim *sim, Err *err) {
+    const SkiffDef *scene = &view->scene->def;
+    GfxCameraDef def = gfx_camera_default((GfxCameraKind)camera->type);
+    int body = camera->body ? find_body(scene, camera->body) : -1;
+    if (camera->body && body < 0)
+        return unknown_body(view, "cameras", index, camera->body, err);
+    bool stands = def.kind == GFX_CAMERA_FIXED && !camera->body;
+    /* A body at sea is the subject; in a tank the water is. */
+    int subject = camera->body                                           ? body
+                  : def.kind == GFX_CAMERA_BOW || view->frame.has_window ? view->hero
+                                                                         : -1;
+    keep(&def.fov_deg, camera->fov);
+    if (subject >= 0)
+        suit_body(&def, sim, subject);
+    else
+        suit_scene(&def, sim, &view->frame, (double)view->options.render.width / view->options.render.height);
+    def.follows = subject >= 0 && !(stands && !isnan(camera->target[0]));
+    bow_of(scene, subject, def.forward);
+    keep3(def.forward, camera->forward);
+    keep3(def.eye, camera->eye);
+    keep3(def.target, camera->target);
+    keep(&def.distance, camera->distance);
+    keep(&def.height, camera->height);
+    keep(&def.look_up, camera->look_up);
+    keep(&def.azimuth, camera->azimuth);
+    keep(&def.period, camera->period);
+    keep(&def.smoothing, camera->smoothing);
+    view->cameras[view->camera_count++] = (ViewCamera){camera->name, subject, def, {0}};
+    return true;
+}
+
+static int find_camera(const View *view, const char *name) {
+    for (int i = 0; i < view->camera_count; i++)
+        if (strcmp(view->cameras[i].name, name) == 0)
+            return i;
+    return -1;
+}
+
+bool view_check_camera(const View *view, const char *name, Err *err) {
+    if (find_camera(view, name) >= 0)
+        return true;
+    char list[1024] = "";
+    for (int i = 0, used = 0; i < view->camera_count && used < (int)sizeof list; i++)
+        used += snprintf(list + used, sizeof list - (size_t)used, "%s%s", i > 0 ? ", " : "",
+                         view->cameras[i].name);
+    return err_set(err, ERR_INPUT, "there is no camera \"%s\"; there are %s", name, list);
+}
+
+/* Those of the scene, then one of each kind under the name of the kind. */
+static bool make_cameras(View *view, const SkiffSim *sim, Err *err) {
+    static const char *const kinds[] = {"chase", "fixed", "orbit", "top", "bow"};
+    enum { KINDS = sizeof kinds / sizeof *kinds };
+    const SceneRender *render = &view->options.render;
+    const SceneCamera *given = render->cameras.items;
+    int count = render->cameras.count;
+    view->cameras = calloc((size_t)count + KINDS, sizeof *view->cameras);
+    if (!view->cameras)
+        return err_set(err, ERR_INPUT, "not enough memory for %d cameras", count);
+    for (int i = 0; i < count; i++) {
+        if (find_camera(view, given[i].name) >= 0)
+            return err_set(err, ERR_INPUT, "%s: Render.cameras[%d]: the name \"%s\" is taken",
+                           view->scene->file, i, given[i].name);
+        if (!add_camera(view, &given[i], i, sim, err))
+            return false;
+    }
+    for (int i = 0; i < KINDS; i++) {
+        SceneCamera camera;
+        scene_camera_default(&camera);
+        camera.name = kinds[i];
+        camera.type = i;
+        if (find_camera(view, kinds[i]) < 0 && !add_camera(view, &camera, count + i, sim, err))
+            return false;
+    }
+    const char *first = render->camera           ? render->camera
+                        : count > 0              ? given[0].name
+                        : view->frame.has_window ? "chase"
+                                                 : "fixed";
+    if (!view_check_camera(view, first, err)) {
+        err_prefix(err, "%s", view->options.keeps_camera ? "--camera" : view->scene->file);
+        return false;
+    }
+    view->camera = find_camera(view, first);
+    return true;
+}
+
+static GfxPose pose_of(const FrameBody *body) {
+    GfxPose pose;
+    memcpy(pose.position, body->position, sizeof pose.position);
+    memcpy(pose.rotation, body->rotation, sizeof pose.rotation);
+    return pose;
+}
+
+/* Moves all cameras on, so that a cut finds each one where it would have been. */
+static GfxCameraView move_cameras(View *view, const Frame *frame) {
+    GfxCameraView current = {0};
+    for (int i = 0; i < view->camera_count; i++) {
+        ViewCamera *camera = &view->cameras[i];
+        GfxPose pose = {.rotation = {0, 0, 0, 1}};
+        if (camera->body >= 0)
+            pose = pose_of(&frame->bodies[camera->body]);
+        GfxCameraView seen =
+            gfx_camera_update(&camera->def, &camera->state, camera->body >= 0 ? &pose : NULL, frame->time);
+        if (i == view->camera)
+            current = seen;
+    }
+    return current;
+}
+
+static bool cut_to_camera(View *view, const char *name, Err *err) {
+    if (!*name || view->options.keeps_camera)
+        return true;
+    if (!view_check_camera(view, name, err))
+        return false;
+    view->camera = find_camera(view, name);
+    return true;
+}
+
+/* ---- Meshes ---- */
+
+static GfxMaterial material_of(const View *view, int body, double height, double level) {
+    static const GfxMaterialKind kinds[] = {GFX_MATERIAL_PAINT, GFX_MATERIAL_HULL, GFX_MATERIAL_STONE};
+    const SkiffBodyDef *def = &view->scene->def.bodies[body];
+    const FieldList *list = &view->options.render.bodies;
+    const SceneMaterial *given = NULL;
+    for (int i = 0; i < list->count; i++)
+        if (strcmp(((const SceneMaterial *)list->items)[i].name, def->name) == 0)
+            given = (const SceneMaterial *)list->items + i;
+    if (!given)
+        return gfx_material_default(def->free_axes != 0 ? GFX_MATERIAL_PAINT : GFX_MATERIAL_STONE);
+    GfxMaterial material = gfx_material_default(kinds[given->material]);
+    if (!isnan(given->color[0]))
+        memcpy(material.color, given->color, sizeof material.color);
+    material.waterline = (float)((isnan(given->waterline) ? level : (double)given->waterline) - height);
+    bool cabin = !isnan(given->cabin_base) && !isnan(given->cabin_top);
+    material.cabin_base = cabin ? (float)((double)given->cabin_base - height) : 0;
+    material.cabin_top = cabin ? (float)((double)given->cabin_top - height) : 0;
+    return material;
+}
+
+static bool add_instance(View *view, const GfxMeshDef *mesh, Err *err) {
+    int index = gfx_add_mesh(view->gfx, mesh, err);
+    GfxInstance *instance = &view->instances[view->instance_count++];
+    *instance = (GfxInstance){.mesh = index};
+    for (int k = 0; k < 4; k++)
+        instance->pose[5 * k] = 1;
+    return index >= 0;
+}
+
+static bool make_meshes(View *view, const SkiffSim *sim, double level, Err *err) {
+    const SceneMaterial *materials = view->options.render.bodies.items;
+    int body_count = skiff_body_count(sim);
+    for (int i = 0; i < view->options.render.bodies.count; i++)
+        if (find_body(&view->scene->def, materials[i].name) < 0)
+            return unknown_body(view, "bodies", i, materials[i].name, err);
+    view->instances = calloc((size_t)body_count + 1, sizeof *view->instances);
+    if (!view->instances)
+        return err_set(err, ERR_INPUT, "not enough memory for %d bodies", body_count);
+    GfxMeshDef mesh = {0};
+    for (int i = 0; i < body_count; i++) {
+        skiff_body_mesh(sim, i, &mesh.vertices, &mesh.vertex_count, &mesh.triangles, &mesh.triangle_count);
+        mesh.material = material_of(view, i, skiff_body(sim, i).position[1], level);
+        if (!add_instance(view, &mesh, err))
+            return false;
+    }
+    skiff_tank_mesh(sim, &mesh.vertices, &mesh.vertex_count, &mesh.triangles, &mesh.triangle_count);
+    view->has_tank = mesh.triangle_count > 0;
+    mesh.material = gfx_material_default(GFX_MATERIAL_TANK);
+    return !view->has_tank || add_instance(view, &mesh, err);
+}
+
+/* Column-major, own frame -> local. */
+static void place_bodies(View *view, const Frame *frame) {
+    for (int i = 0; i < frame->body_count; i++) {
+        const double *q = frame->bodies[i].rotation, *p = frame->bodies[i].position;
+        double x = q[0], y = q[1], z = q[2], w = q[3];
+        const double m[16] = {1 - 2 * (y * y + z * z), 2 * (x * y + w * z),     2 * (x * z - w * y),     0,
+                              2 * (x * y - w * z),     1 - 2 * (x * x + z * z), 2 * (y * z + w * x),     0,
+                              2 * (x * z + w * y),     2 * (y * z - w * x),     1 - 2 * (x * x + y * y), 0,
+                              p[0] - frame->origin[0], p[1] - frame->origin[1], p[2] - frame->origin[2], 1};
+        for (int k = 0; k < 16; k++)
+            view->instances[i].pose[k] = (float)m[k];
+    }
+}
+
+/* ---- The window's edge ---- */
+
+/* Samples the distance to the edge around the water of the first frame, which fills the window. The map is
+ * local, and so is the window: it never changes. */
+static bool make_edge_map(View *view, const SkiffSim *sim, Err *err) {
+    const float margin = 1.0f; /* m */
+    Bounds bounds = bounds_of_water(&view->frame);
+    if (!view->frame.has_window || view->frame.live == 0)
+        return true;
+    uint32_t *size = view->edge_size;
+    for (int k = 0; k < 2; k++) {
+        view->edge_min[k] = (float)bounds.min[2 * k] - margin;
+        view->edge_max[k] = (float)bounds.max[2 * k] + margin;
+        float cells = (view->edge_max[k] - view->edge_min[k]) / (2 * view->frame.spacing);
+        size[k] = 2 + (uint32_t)fminf(cells, EDGE_MAP_MAX - 2);
+    }
+    uint32_t count = size[0] * size[1];
+    float(*points)[4] = calloc(count, sizeof *points);
+    view->edge_map = calloc(count, sizeof *view->edge_map);
+    bool ok = points && view->edge_map;
+    for (uint32_t i = 0; ok && i < count; i++) {
+        const uint32_t at[2] = {i % size[0], i / size[0]};
+        for (int k = 0; k < 2; k++)
+            points[i][2 * k] = view->edge_min[k] +
+                               (float)at[k] * (view->edge_max[k] - view->edge_min[k]) / (float)(size[k] - 1);
+        points[i][1] = (float)(view->frame.level - view->frame.origin[1]);
+    }
+    if (ok)
+        frame_window_distances(sim, (const float(*)[4])points, count, view->edge_map);
+    for (uint32_t i = 0; ok && i < count; i++)
+        view->edge_map[i] = -view->edge_map[i]; /* the renderer counts inwards */
+    free(points);
+    return ok || err_set(err, ERR_INPUT, "not enough memory for the map of the window's edge");
+}
+
+static GfxOcean ocean_of(const View *view, const Frame *frame) {
+    const SceneRender *render = &view->options.render;
+    GfxOcean ocean = gfx_scene_default().ocean;
+    ocean.ripples = render->ripples;
+    ocean.enabled = frame->has_window && view->edge_map;
+    if (ocean.enabled) {
+        ocean.level = (float)(frame->level - frame->origin[1]);
+        ocean.edge_distance = view->edge_map;
+        memcpy(ocean.edge_size, view->edge_size, sizeof ocean.edge_size);
+        memcpy(ocean.edge_min, view->edge_min, sizeof ocean.edge_min);
+        memcpy(ocean.edge_max, view->edge_max, sizeof ocean.edge_max);
+        ocean.blend[0] = render->fade ? 0.15f * render->fade_edge : 0;
+        ocean.blend[1] = render->fade ? render->fade_edge : 0.01f * frame->spacing;
+        return ocean;
+    }
+    double sum = 0;
+    for (uint32_t i = 0; i < frame->live; i++)
+        sum += (double)frame->position[i][1];
+    /* The mean lies half way between the floor and the surface of water at rest. */
+    ocean.level = frame->live > 0 ? (float)(2 * sum / frame->live) - view->floor : view->floor;
+    return ocean;
+}
+
+/* ---- What each particle shows ---- */
+
+static float smooth(float value) {
+    float t = fmaxf(0, fminf(1, value));
+    return t * t * (3 - 2 * t);
+}
+
+/* 0 (not there) .. 1. What existed at the start of the simulation has always been there. */
+static float fade_of(const View *view, const Frame *frame, uint32_t i) {
+    const SceneRender *render = &view->options.render;
+    float age = (float)(frame->time - frame->birth[i]);
+    bool is_new = frame->birth[i] > view->start + time_tolerance;
+    if (is_new && age < 0)
+        return 0; /* comes at the end of this step */
+    if (!render->fade)
+        return i < frame->live;
+    float fade = is_new ? smooth(age / render->fade_in) : 1;
+    if (i >= frame->live)
+        fade *= 1 - smooth(frame->gone[i] / render->fade_out);
+    if (frame->has_window && render->look == GFX_LOOK_PARTICLES) /* water: the ocean takes over */
+        fade *= smooth(-frame->edge[i] / render->fade_edge);
+    return fade;
+}
+
+static float field_of(const Frame *frame, int field, uint32_t i) {
+    const float *v = frame->velocity[i];
+    switch ((RenderField)field) {
+    case RENDER_SPEED:
+        return sqrtf(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    case RENDER_DENSITY:
+        return frame->density[i];
+    case RENDER_PRESSURE:
+        return frame->pressure[i];
+    case RENDER_AGE:
+        return (float)(frame->time - frame->birth[i]);
+    case RENDER_WINDOW:
+        return frame->has_window ? -frame->edge[i] : 0;
+    case RENDER_FIELD_COUNT:
+        break;
+    }
+    return 0;
+}
+
+static GfxField legend_of(const SceneRender *render) {
+    static const GfxField fields[RENDER_FIELD_COUNT] = {
+        [RENDER_SPEED] = {0, 3, "speed", "m/s"},
+        [RENDER_DENSITY] = {0.9f, 1.05f, "density / rest density", ""},
+        [RENDER_PRESSURE] = {0, 10000, "pressure", "Pa"},
+        [RENDER_AGE] = {0, 5, "age", "s"},
+        [RENDER_WINDOW] = {0, 1, "distance from the edge", "m"},
+    };
+    GfxField field = fields[render->field];
+    field.min = isnan(render->field_min) ? field.min : render->field_min;
+    field.max = isnan(render->field_max) ? field.max : render->field_max;
+    if (!(field.min < field.max)) /* one end given, beyond the default of the other */
+        *(isnan(render->field_min) ? &field.min : &field.max) =
+            isnan(render->field_min) ? field.max - 1 : field.min + 1;
+    return field;
+}
+
+static bool reserve_scalars(View *view, uint32_t count, Err *err) {
+    if (count <= view->scalar_capacity && view->scalars)
+        return true;
+    uint32_t capacity = count + count / 8 + 64;
+    free(view->scalars);
+    view->scalars = malloc(3 * (size_t)capacity * sizeof *view->scalars);
+    view->scalar_capacity = view->scalars ? capacity : 0;
+    return view->scalars || err_set(err, ERR_INPUT, "not enough memory to draw %u particles", count);
+}
+
+static GfxParticles particles_of(View *view, const Frame *frame) {
+    float *fade = view->scalars, *foam = fade + view->scalar_capacity, *field = foam + view->scalar_capacity;
+    for (uint32_t i = 0; i < frame->count; i++) {
+        fade[i] = fade_of(view, frame, i);
+        field[i] = field_of(frame, view->options.render.field, i);
+    }
+    return (GfxParticles){.count = frame->count,
+                          .spacing = frame->spacing,
+                          .position = (const float(*)[4])frame->position,
+                          .velocity = (const float(*)[4])frame->velocity,
+                          .fade = fade,
+                          .foam = foam,
+                          .field = field,
+                          .id = frame->id};
+}
+
+/* ---- One picture ---- */
+
+static GfxCamera local_camera(const GfxCameraView *seen, const double origin[3], const GfxCamera *defaults) {
+    GfxCamera camera = *defaults;
+    for (int k = 0; k < 3; k++) {
+        camera.eye[k] = (float)(seen->eye[k] - origin[k]);
+        camera.target[k] = (float)(seen->target[k] - origin[k]);
+        camera.up[k] = (float)seen->up[k];
+    }
+    camera.fov_deg = (float)seen->fov_deg;
+    return camera;
+}
+
+static void draw_figures(const View *view, const Frame *frame) {
+    const SceneRender *render = &view->options.render;
+    const FrameControls *driven = &frame->controls;
+    if (!view->hud)
+        return;
+    GfxHudValues values = gfx_hud_nothing();
+    values.time = frame->time;
+    values.particles = frame->live;
+    values.throttle = driven->throttle;
+    values.rudder = driven->rudder;
+    if (driven->has_keys)
+        values.keys = driven->keys;
+    if (frame->has_window)
+        values.moves = (long)frame->moves;
+    if (view->hero >= 0 && (frame->has_window || !isnan(driven->throttle))) {
+        const double *v = frame->bodies[view->hero].velocity;
+        values.speed = hypot(v[0], v[2]);
+    }
+    if (render->hud == RENDER_HUD_TIMING)
+        values.step_ms = view->step_ms;
+    gfx_hud_draw(view->hud, (GfxImage){view->rgb, render->width, render->height}, &values);
+}
+
+static const char *frame_path(const View *view, const char *folder, int number, const char *suffix,
+                              char path[PATH_SIZE]) {
+    snprintf(path, PATH_SIZE, "%.4000s/%s/frame_%06d.%s", view->output, folder, number, suffix);
+    return path;
+}
+
+static bool draw(View *view, const Frame *frame, int number, Err *err) {
+    char path[PATH_SIZE];
+    if (!reserve_scalars(view, frame->count, err) ||
+        !foam_update(view->foam, frame, view->scalars + view->scalar_capacity, err) ||
+        !cut_to_camera(view, frame->controls.camera, err))
+        return false;
+    GfxCameraView seen = move_cameras(view, frame);
+    if (number < view->options.first)
+        return true;
+    GfxScene scene = gfx_scene_default();
+    place_bodies(view, frame);
+    scene.particles = particles_of(view, frame);
+    scene.instances = view->instances;
+    scene.instance_count = view->instance_count;
+    scene.camera = local_camera(&seen, frame->origin, &scene.camera);
+    scene.ocean = ocean_of(view, frame);
+    scene.field = legend_of(&view->options.render);
+    scene.ground = !scene.ocean.enabled && view->has_tank;
+    scene.ground_level = view->floor;
+    memcpy(scene.sun, view->options.render.sun, sizeof scene.sun);
+    scene.time = frame->time;
+    memcpy(scene.origin, frame->origin, sizeof scene.origin);
+    if (!gfx_draw(view->gfx, &scene, view->rgb, err))
+        return false;
+    draw_figures(view, frame);
+    view->drawn++;
+    return gfx_writer_add(view->writer, frame_path(view, "frames", number, "png", path), view->video,
+                          view->rgb, err);
+}
+
+/* ---- Life ---- */
+
+static bool make_picture(View *view, const SkiffSim *sim, Err *err) {
+    const SceneRender *render = &view->options.render;
+    static const GfxBackend backends[] = {GFX_BACKEND_AUTO, GFX_BACKEND_EGL_DEVICE,
+                                          GFX_BACKEND_EGL_SURFACELESS, GFX_BACKEND_OSMESA};
+    static const GfxLook looks[] = {GFX_LOOK_WATER, GFX_LOOK_PARTICLES};
+    GfxDef def = gfx_def_default();
+    def.width = render->width;
+    def.height = render->height;
+    def.supersample = render->supersample;
+    def.look = looks[render->look];
+    def.backend = backends[view->options.backend];
+    if (view->options.video && !gfx_video_check(err))
+        return false;
+    if (view->options.video && (def.width % 2 != 0 || def.height % 2 != 0))
+        return err_set(err, ERR_USAGE, "--video: width and height must be even, found %dx%d", def.width,
+                       def.height);
+    view->gfx = gfx_create(&def, err);
+    if (!view->gfx)
+        return false;
+    GfxInfo info = gfx_info(view->gfx);
+    log_write(LOG_INFO, "OpenGL by %s: %s, %s (%s)", gfx_backend_name(info.backend), info.renderer,
+              info.version, info.reason);
+    Bounds bounds = bounds_of_scene(sim, &view->frame);
+    view->floor = isfinite(bounds.min[1]) ? (float)bounds.min[1] : 0;
+    double level = view->frame.has_window
+                       ? view->frame.level
+                       : (double)ocean_of(view, &view->frame).level + view->frame.origin[1];
+    view->rgb = malloc((size_t)def.width * (size_t)def.height * 3);
+    view->foam = foam_create();
+    if (!view->rgb || !view->foam)
+        return err_set(err, ERR_INPUT, "not enough memory for a picture of %dx%d", def.width, def.height);
+    if (render->hud != RENDER_HUD_OFF && !(view->hud = gfx_hud_create(def.height, err)))
+        return false;
+    return make_cameras(view, sim, err) && make_meshes(view, sim, level, err) &&
+           make_edge_map(view, sim, err);
+}
+
+View *view_create(const ViewOptions *options, const Scene *scene, const SkiffSim *sim, Err *err) {
+    View *view = calloc(1, sizeof *view);
+    FrameBody *before = calloc((size_t)skiff_body_count(sim) + 1, sizeof *before);
+    if (!view || !before) {
+        err_set(err, ERR_INPUT, "not enough memory for pictures");
+        free(view);
+        free(before);
+        return NULL;
+    }
+    view->options = *options;
+    view->scene = scene;
+    view->start = scene->def.start_time;
+    view->before = before;
+    view->step_ms = NAN;
+    view->hero = find_hero(&scene->def);
+    view->draw = (Sequence){options->draws ? options->render.fps : 0, 1, options->last};
+    view->save = (Sequence){options->save_rate, 1, 0};
+    if (!frame_capture(&view->frame, sim, NULL, 0, skiff_time(sim), err) ||
+        (options->draws && !make_picture(view, sim, err))) {
+        view_destroy(view);
+        return NULL;
+    }
+    return view;
+}
+
+static double time_of(const View *view, const Sequence *sequence) {
+    bool is_over = sequence->rate == 0 || (sequence->last > 0 && sequence->next > sequence->last);
+    return is_over ? INFINITY : view->start + (double)(sequence->next - 1) / sequence->rate;
+}
+
+static bool save(View *view, int number, Err *err) {
+    char path[PATH_SIZE];
+    view->frame.rate = view->save.rate;
+    return frame_save(&view->frame, frame_path(view, "particles", number, "skiff", path), err);
+}
+
+/* Draws and saves all that is due by now. */
+static bool catch_up(View *view, const SkiffSim *sim, const FrameBody *before, const ViewControls *controls,
+                     Err *err) {
+    double now = skiff_time(sim) + time_tolerance;
+    for (;;) {
+        double draw_time = time_of(view, &view->draw), save_time = time_of(view, &view->save);
+        double time = fmin(draw_time, save_time);
+        if (!(time <= now))
+            return true;
+        if (!frame_capture(&view->frame, sim, before, view->before_time, time, err))
+            return false;
+        view->frame.controls = controls->driven;
+        view->step_ms = controls->step_ms;
+        if (save_time <= time + time_tolerance && !save(view, view->save.next++, err))
+            return false;
+        if (draw_time <= time + time_tolerance && !draw(view, &view->frame, view->draw.next++, err))
+            return false;
+    }
+}
+
+/* Puts the frames before the first one to be drawn into the film. */
+static bool add_old_frames(View *view, Err *err) {
+    const SceneRender *render = &view->options.render;
+    char path[PATH_SIZE];
+    int first = view->options.first;
+    for (int i = first; i < view->draw.next; i++)
+        if (!file_exists(frame_path(view, "frames", i, "png", path))) {
+            log_write(LOG_WARNING, "%s: there is no such frame; video.mp4 begins where the run goes on",
+                      path);
+            return true;
+        }
+    for (int i = first; i < view->draw.next; i++)
+        if (!gfx_png_read(frame_path(view, "frames", i, "png", path), view->rgb, render->width,
+                          render->height, err) ||
+            !gfx_writer_add(view->writer, NULL, view->video, view->rgb, err))
+            return false;
+    return true;
+}
+
+static void skip_to(const View *view, Sequence *sequence, double time) {
+    while (time_of(view, sequence) <= time + time_tolerance)
+        sequence->next++;
+}
+
+bool view_begin(View *view, const SkiffSim *sim, const char *output, Err *err) {
+    const SceneRender *render = &view->options.render;
+    char path[PATH_SIZE];
+    snprintf(view->output, sizeof view->output, "%.4000s", output);
+    if (view->save.rate > 0) {
+        snprintf(path, sizeof path, "%.4000s/particles", output);
+        if (!file_make_directory(path, err))
+            return false;
+    }
+    if (view->draw.rate > 0) {
+        snprintf(path, sizeof path, "%.4000s/frames", output);
+        view->writer = file_make_directory(path, err)
+                           ? gfx_writer_begin(render->width, render->height, QUEUE_LENGTH, err)
+                           : NULL;
+        snprintf(path, sizeof path, "%.4000s/video.mp4", output);
+        if (!view->writer ||
+            (view->options.video &&
+             !(view->video = gfx_video_begin(path, render->width, render->height, render->fps, err))))
+            return false;
+    }
+    if (!sim)
+        return true;
+    frame_poses(sim, view->before);
+    view->before_time = skiff_time(sim);
+    if (view->options.is_resumed) {
+        skip_to(view, &view->draw, skiff_time(sim));
+        skip_to(view, &view->save, skiff_time(sim));
+        return !view->video || add_old_frames(view, err);
+    }
+    ViewControls controls = view_controls_none();
+    return catch_up(view, sim, NULL, &controls, err);
+}
+
+bool view_step(View *view, const SkiffSim *sim, const ViewControls *controls, Err *err) {
+    if (!catch_up(view, sim, view->before, controls, err))
+        return false;
+    frame_poses(sim, view->before);
+    view->before_time = skiff_time(sim);
+    return true;
+}
+
+bool view_saved(View *view, const Frame *frame, int number, Err *err) {
+    view->step_ms = NAN;
+    return draw(view, frame, number, err);
+}
+
+int view_frame_count(const View *view) {
+    return view->drawn;
+}
+
+bool view_finish(View *view, Err *err) {
+    bool ok = gfx_writer_finish(view->writer, err);
+    view->writer = NULL;
+    if (view->video && ok)
+        ok = gfx_video_finish(view->video, err);
+    else
+        gfx_video_abort(view->video);
+    view->video = NULL;
+    return ok;
+}
+
+void view_destroy(View *view) {
+    if (!view)
+        return;
+    gfx_writer_finish(view->writer, NULL);
+    gfx_video_abort(view->video);
+    gfx_hud_destroy(view->hud);
+    gfx_destroy(view->gfx);
+    foam_destroy(view->foam);
+    frame_free(&view->frame);
+    free(view->rgb);
+    free(view->cameras);
+    free(view->instances);
+    free(view->edge_map);
+    free(view->before);
+    free(view->scalars);
+    free(view);
+}
+
+/* ---- Results of an earlier run ---- */
+
+/* Files frame_NNNNNN.suffix and what a crash left of them. */
+static bool remove_sequence(const char *output, const char *folder, const char *suffix, Err *err) {
+    char path[PATH_SIZE], name[300];
+    snprintf(path, sizeof path, "%.4000s/%s", output, folder);
+    DIR *directory = opendir(path);
+    if (!directory)
+        return errno == ENOENT || err_set(err, ERR_IO, "%s: cannot open: %s", path, strerror(errno));
+    bool ok = true;
+    for (struct dirent *entry = readdir(directory); ok && entry; entry = readdir(directory)) {
+        int number, end = 0;
+        if (sscanf(entry->d_name, "frame_%d.%n", &number, &end) != 1 || end == 0)
+            continue;
+        snprintf(name, sizeof name, "%s.tmp", suffix);
+        if (strcmp(entry->d_name + end, suffix) != 0 && strcmp(entry->d_name + end, name) != 0)
+            continue;
+        snprintf(path, sizeof path, "%.3000s/%s/%.255s", output, folder, entry->d_name);
+        if (unlink(path) != 0)
+            ok = err_set(err, ERR_IO, "%s: cannot be replaced: %s", path, strerror(errno));
+    }
+    closedir(directory);
+    return ok;
+}
+
+bool view_remove(const char *output, Err *err) {
+    static const char *const names[] = {"video.mp4", "video.mp4.tmp"};
+    char path[PATH_SIZE];
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        snprintf(path, sizeof path, "%.4000s/%s", output, names[i]);
+        if (unlink(path) != 0 && errno != ENOENT)
+            return err_set(err, ERR_IO, "%s: cannot be replaced: %s", path, strerror(errno));
+    }
+    return remove_sequence(output, "frames", "png", err) &&
+           remove_sequence(output, "particles", "skiff", err);
+}
