@@ -14,9 +14,16 @@
  *   ... fill in ...
  *   gfx_draw(gfx, &scene, rgb, &err);
  *   gfx_destroy(gfx);
+ *
+ * Where the camera is, figures in the picture and files of it are in headers of their own, included here.
  */
 #ifndef SKIFF_GFX_H
 #define SKIFF_GFX_H
+
+#include "camera.h"
+#include "hud.h"
+#include "png.h"
+#include "writer.h"
 
 #include "engine/base/err.h"
 
