@@ -1,0 +1,272 @@
+/* Which particles are drawn.
+ *
+ * Particles are counted in cubic cells of two spacings. A cell that holds less than a third of what water holds is open.
+ * Particles whose cell touches an open one on the side of the eye are drawn: about two layers. Over an ocean the space
+ * beside the window counts as full, as the ocean covers it. Particles alone in their neighbourhood become droplets:
+ * smaller ones, scattered around the particle by its id, stretched along its path.
+ *
+ * Counting is exact integer work in the order of the input, so that equal input gives equal lists. A few particles far
+ * away only make the cells larger: more is drawn, never less. */
+#include "surface.h"
+
+#include <math.h>
+#include <string.h>
+
+enum {
+    MAX_CELLS = 1 << 22,
+    DEPTH_BINS = 4096,
+    DROPLETS_EACH = 7,
+    ISOLATED_AT_MOST = 3, /* particles in 27 cells, itself included */
+};
+enum { MEMORY_BODY, MEMORY_DROPLETS, MEMORY_FADING, MEMORY_SORTED, MEMORY_CELLS, MEMORY_COLUMNS, MEMORY_CELL_OF };
+
+#define OPEN_PART     0.35f  /* a cell with less than this part of a full one is open */
+#define DROPLET_SHOW  0.012f /* s of path shown by a droplet's stretch */
+#define WATER_PART    0.8f   /* mass of a particle / (rho0 d^3) */
+
+typedef struct Cells {
+    int size[3]; /* with a margin of one empty cell on every side */
+    float origin[3], inv_edge;
+    uint16_t *count;
+    uint8_t *column; /* 1: some particle is above or below */
+    int32_t *cell_of;
+    int open_below; /* counts below this make a cell open */
+} Cells;
+
+static float fade_of(const GfxParticles *particles, uint32_t i) {
+    return particles->fade ? particles->fade[i] : 1.0f;
+}
+
+static bool find_bounds(const GfxParticles *particles, float min[3], float max[3], Err *err) {
+    for (int k = 0; k < 3; k++)
+        min[k] = max[k] = particles->position[0][k];
+    for (uint32_t i = 0; i < particles->count; i++)
+        for (int k = 0; k < 3; k++) {
+            float x = particles->position[i][k];
+            if (!isfinite(x))
+                return err_set(err, ERR_USAGE, "particle %u of %u has coordinate %c = %g", i, particles->count,
+                               "xyz"[k], (double)x);
+            min[k] = x < min[k] ? x : min[k];
+            max[k] = x > max[k] ? x : max[k];
+        }
+    return true;
+}
+
+static bool make_cells(Cells *cells, Surface *surface, const GfxParticles *particles, Err *err) {
+    float min[3], max[3], edge = 2.0f * particles->spacing;
+    if (!find_bounds(particles, min, max, err))
+        return false;
+    double total;
+    for (;; edge *= 2.0f) {
+        total = 1.0;
+        for (int k = 0; k < 3; k++)
+            total *= floor((double)(max[k] - min[k]) / edge) + 4.0;
+        if (total <= MAX_CELLS)
+            break;
+    }
+    for (int k = 0; k < 3; k++) {
+        cells->size[k] = (int)floorf((max[k] - min[k]) / edge) + 4;
+        cells->origin[k] = min[k] - 1.5f * edge;
+    }
+    cells->inv_edge = 1.0f / edge;
+    float ratio = edge / particles->spacing;
+    float open = ceilf(OPEN_PART * ratio * ratio * ratio / WATER_PART);
+    cells->open_below = open > 60000.0f ? 60000 : (int)open;
+    size_t count = (size_t)cells->size[0] * (size_t)cells->size[1] * (size_t)cells->size[2];
+    size_t columns = (size_t)cells->size[0] * (size_t)cells->size[2];
+    Buffer *memory = surface->memory;
+    if (!buffer_reserve(&memory[MEMORY_CELLS], "surface cells", count * sizeof *cells->count, err) ||
+        !buffer_reserve(&memory[MEMORY_COLUMNS], "surface columns", columns, err) ||
+        !buffer_reserve(&memory[MEMORY_CELL_OF], "surface particles", particles->count * sizeof *cells->cell_of, err))
+        return false;
+    cells->count = memory[MEMORY_CELLS].data;
+    cells->column = memory[MEMORY_COLUMNS].data;
+    cells->cell_of = memory[MEMORY_CELL_OF].data;
+    memset(cells->count, 0, count * sizeof *cells->count);
+    memset(cells->column, 0, columns);
+    return true;
+}
+
+static int cell_coordinate(const Cells *cells, float x, int k) {
+    return (int)((x - cells->origin[k]) * cells->inv_edge);
+}
+
+/* y runs fastest, so that columns are contiguous. */
+static void count_particles(Cells *cells, const GfxParticles *particles, float solid_fade) {
+    for (uint32_t i = 0; i < particles->count; i++) {
+        const float *p = particles->position[i];
+        int x = cell_coordinate(cells, p[0], 0), y = cell_coordinate(cells, p[1], 1);
+        int column = cell_coordinate(cells, p[2], 2) * cells->size[0] + x;
+        int cell = column * cells->size[1] + y;
+        cells->cell_of[i] = cell;
+        cells->column[column] = 1;
+        if (fade_of(particles, i) >= solid_fade && cells->count[cell] < UINT16_MAX)
+            cells->count[cell]++;
+    }
+}
+
+/* Does the cell touch an open one on the side of the eye, or is it open itself? */
+static bool is_outer(const Cells *cells, int cell, const int eye[3], bool ocean) {
+    int y = cell % cells->size[1], column = cell / cells->size[1];
+    int c[3] = {column % cells->size[0], y, column / cells->size[0]}, from[3], to[3];
+    for (int k = 0; k < 3; k++) {
+        from[k] = c[k] > eye[k] - 2 ? -1 : 0;
+        to[k] = c[k] < eye[k] + 2 ? 1 : 0;
+    }
+    for (int dz = from[2]; dz <= to[2]; dz++)
+        for (int dx = from[0]; dx <= to[0]; dx++) {
+            int near = column + dz * cells->size[0] + dx;
+            if (ocean && !cells->column[near])
+                continue;
+            for (int dy = from[1]; dy <= to[1]; dy++)
+                if (cells->count[near * cells->size[1] + y + dy] < cells->open_below)
+                    return true;
+        }
+    return false;
+}
+
+static bool is_alone(const Cells *cells, int cell) {
+    int total = 0;
+    for (int dz = -1; dz <= 1; dz++)
+        for (int dx = -1; dx <= 1; dx++)
+            for (int dy = -1; dy <= 1; dy++)
+                total += cells->count[cell + (dz * cells->size[0] + dx) * cells->size[1] + dy];
+    return total <= ISOLATED_AT_MOST;
+}
+
+/* ---- Droplets ---- */
+
+/* A counter-based random number in [0, 1): splitmix64's finaliser of id and draw. */
+static float random_part(uint64_t id, uint64_t draw) {
+    uint64_t z = (id * 64 + draw + 1) * 0x9e3779b97f4a7c15u;
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    return (float)((z ^ (z >> 31)) >> 40) * 0x1p-24f;
+}
+
+static void add_droplets(SurfaceList *list, const GfxParticles *particles, uint32_t i) {
+    uint64_t id = particles->id ? particles->id[i] : i;
+    float fade = fade_of(particles, i), d = particles->spacing;
+    for (uint64_t k = 0; k < DROPLETS_EACH; k++) {
+        SurfacePoint *point = &list->points[list->count++];
+        float along = random_part(id, 5 * k + 3) - 0.5f, size = random_part(id, 5 * k + 4);
+        for (uint64_t axis = 0; axis < 3; axis++) {
+            /* Two draws: denser in the middle. */
+            float off = random_part(id, 5 * k + axis) + random_part(id, 5 * k + axis + 1) - 1.0f;
+            float path = particles->velocity ? particles->velocity[i][axis] * DROPLET_SHOW : 0.0f;
+            point->position[axis] = particles->position[i][axis] + 0.8f * d * off + path * along * 2.0f;
+        }
+        point->value = d * (0.05f + 0.13f * size * size);
+        point->fade = fade * 0.85f;
+    }
+}
+
+/* ---- Order of what fades ---- */
+
+static float depth_along(const float axis[3], const SurfacePoint *point) {
+    return point->position[0] * axis[0] + point->position[1] * axis[1] + point->position[2] * axis[2];
+}
+
+/* Farthest first by distance along the view, in bins; the order of the input within a bin. */
+static bool sort_far_first(Surface *surface, const GfxCamera *camera, Err *err) {
+    SurfaceList *list = &surface->fading;
+    uint32_t starts[DEPTH_BINS + 1] = {0};
+    float axis[3], min = INFINITY, max = -INFINITY;
+    for (int k = 0; k < 3; k++)
+        axis[k] = camera->target[k] - camera->eye[k];
+    size_t size = (size_t)list->count * sizeof(SurfacePoint);
+    if (!buffer_reserve(&surface->memory[MEMORY_SORTED], "fading particles", size, err))
+        return false;
+    SurfacePoint *sorted = surface->memory[MEMORY_SORTED].data;
+    for (uint32_t i = 0; i < list->count; i++) {
+        float depth = depth_along(axis, &list->points[i]);
+        min = depth < min ? depth : min;
+        max = depth > max ? depth : max;
+    }
+    float scale = max > min ? (DEPTH_BINS - 1) / (max - min) : 0.0f;
+    for (uint32_t i = 0; i < list->count; i++)
+        starts[(int)((max - depth_along(axis, &list->points[i])) * scale) + 1]++;
+    for (int bin = 0; bin < DEPTH_BINS; bin++)
+        starts[bin + 1] += starts[bin];
+    for (uint32_t i = 0; i < list->count; i++)
+        sorted[starts[(int)((max - depth_along(axis, &list->points[i])) * scale)]++] = list->points[i];
+    list->points = sorted;
+    return true;
+}
+
+/* ---- All ---- */
+
+static bool reserve_lists(Surface *surface, uint32_t count, Err *err) {
+    Buffer *memory = surface->memory;
+    size_t size = (size_t)count * sizeof(SurfacePoint);
+    if (!buffer_reserve(&memory[MEMORY_BODY], "drawn particles", size, err) ||
+        !buffer_reserve(&memory[MEMORY_FADING], "fading particles", size, err))
+        return false;
+    surface->body = (SurfaceList){memory[MEMORY_BODY].data, 0};
+    surface->fading = (SurfaceList){memory[MEMORY_FADING].data, 0};
+    surface->droplets = (SurfaceList){NULL, 0};
+    return true;
+}
+
+/* The lone ones, known after a first sweep, give several points each. */
+static bool fill_droplets(Surface *surface, const Cells *cells, const GfxParticles *particles, Err *err) {
+    uint32_t alone = 0;
+    for (uint32_t i = 0; i < particles->count; i++)
+        alone += cells->cell_of[i] < 0;
+    Buffer *memory = &surface->memory[MEMORY_DROPLETS];
+    if (!buffer_reserve(memory, "droplets", (size_t)alone * DROPLETS_EACH * sizeof(SurfacePoint), err))
+        return false;
+    surface->droplets.points = memory->data;
+    for (uint32_t i = 0; i < particles->count; i++)
+        if (cells->cell_of[i] < 0)
+            add_droplets(&surface->droplets, particles, i);
+    return true;
+}
+
+static SurfacePoint make_point(const GfxParticles *particles, const float *values, uint32_t i, float fade) {
+    const float *p = particles->position[i];
+    return (SurfacePoint){{p[0], p[1], p[2]}, fade, values ? values[i] : 0.0f};
+}
+
+bool surface_select(Surface *surface, const GfxScene *scene, GfxLook look, Err *err) {
+    const GfxParticles *particles = &scene->particles;
+    bool water = look == GFX_LOOK_WATER;
+    Cells cells;
+    if (!reserve_lists(surface, particles->count, err))
+        return false;
+    if (particles->count == 0)
+        return true;
+    if (!make_cells(&cells, surface, particles, err))
+        return false;
+    /* What one can look through hides nothing: among spheres only the opaque ones fill a cell. */
+    count_particles(&cells, particles, water ? 0.5f : 1.0f);
+    int eye[3];
+    for (int k = 0; k < 3; k++) {
+        float cell = (scene->camera.eye[k] - cells.origin[k]) * cells.inv_edge;
+        eye[k] = (int)(cell < -9.0f ? -9.0f : cell > 1e6f ? 1e6f : cell);
+    }
+    const float *values = water ? particles->foam : particles->field;
+    for (uint32_t i = 0; i < particles->count; i++) {
+        float fade = fade_of(particles, i);
+        int cell = cells.cell_of[i];
+        if (!(fade > 0.0f))
+            continue;
+        if (!water && fade < 1.0f)
+            surface->fading.points[surface->fading.count++] = make_point(particles, values, i, fade);
+        else if (is_outer(&cells, cell, eye, water && scene->ocean.enabled)) {
+            if (water && is_alone(&cells, cell))
+                cells.cell_of[i] = -1;
+            else
+                surface->body.points[surface->body.count++] = make_point(particles, values, i, fade);
+        }
+    }
+    if (water)
+        return fill_droplets(surface, &cells, particles, err);
+    return sort_far_first(surface, &scene->camera, err);
+}
+
+void surface_free(Surface *surface) {
+    for (size_t i = 0; i < sizeof surface->memory / sizeof surface->memory[0]; i++)
+        buffer_free(&surface->memory[i]);
+    *surface = (Surface){0};
+}

@@ -1,0 +1,35 @@
+/* Chooses the particles to draw (surface.c) and hands them to GL. */
+#include "pass.h"
+
+#include <stddef.h>
+
+static void upload(const Gl *gl, PointBuffer *points, const SurfaceList *list) {
+    if (!points->vertex_array) {
+        gl->GenVertexArrays(1, &points->vertex_array);
+        gl->GenBuffers(1, &points->buffer);
+        gl->BindVertexArray(points->vertex_array);
+        gl->BindBuffer(GL_ARRAY_BUFFER, points->buffer);
+        gl->EnableVertexAttribArray(0);
+        gl->EnableVertexAttribArray(1);
+        gl->VertexAttribPointer(0, 4, GL_FLOAT, GL_FALSE, sizeof(SurfacePoint), NULL);
+        gl->VertexAttribPointer(1, 1, GL_FLOAT, GL_FALSE, sizeof(SurfacePoint),
+                                (void *)offsetof(SurfacePoint, value));
+    }
+    points->count = (GLsizei)list->count;
+    gl->BindBuffer(GL_ARRAY_BUFFER, points->buffer);
+    gl->BufferData(GL_ARRAY_BUFFER, (GLsizeiptr)((size_t)list->count * sizeof(SurfacePoint)), list->points,
+                   GL_STREAM_DRAW);
+}
+
+static bool draw(Pass *pass, Frame *frame, Err *err) {
+    (void)pass;
+    Surface *surface = &frame->surface;
+    if (!surface_select(surface, frame->scene, frame->def.look, err))
+        return false;
+    upload(frame->gl, &frame->body, &surface->body);
+    upload(frame->gl, &frame->droplets, &surface->droplets);
+    upload(frame->gl, &frame->fading, &surface->fading);
+    return true;
+}
+
+const PassType surface_pass = {"surface", PASS_IN_WATER | PASS_IN_PARTICLES, -1, NULL, draw};

@@ -1,0 +1,161 @@
+// The water look: where the water's surface is (particles inside the window, still water outside, blended by the distance to
+// the window's edge), and what one sees on it and through it. Colours are as displayed; the constants are tuned by eye.
+#include "frame.glsl"
+#include "sky.glsl"
+#include "ripples.glsl"
+uniform sampler2D mesh_image, mesh_depth_image, reflection_image, normal_image, thickness_image, edge_image;
+in vec2 uv;
+layout(location = 0) out vec4 color;
+
+const float NEVER = 1e9;
+
+struct Water {
+    float depth;  // of the eye
+    vec3 place;
+    vec3 normal;
+    float fluid;  // 1: particles alone, 0: ocean alone
+};
+
+// How much the particles count at local x, z.
+float fluid_part(vec2 p) {
+    if (edge.z == 0.0)
+        return 1.0;
+    vec2 t = edge_box.xy + p * edge_box.zw;
+    if (any(greaterThan(abs(t - 0.5), vec2(0.5))))
+        return 0.0;
+    return smoothstep(edge.x, edge.y, textureLod(edge_image, t, 0.0).r);
+}
+
+Water find_water(vec3 ray, bool mesh_there) {
+    Water water = Water(NEVER, eye.xyz, vec3(0.0, 1.0, 0.0), 0.0);
+    float still = (eye.w - eye.y) / (abs(ray.y) > 1e-5 ? ray.y : 1e-5);
+    bool ocean = edge.z > 0.0 && still > 0.0;
+    vec4 fluid = textureLod(normal_image, uv, 0.0);
+    if (fluid.w > 0.5) {
+        fluid /= fluid.w;
+        float depth = fluid.z + plane_depth(ray);
+        float part = fluid_part((eye.xyz + ray * depth).xz);
+        if (part > 0.0) {
+            vec3 n = vec3(fluid.xy, sqrt(max(0.003, 1.0 - dot(fluid.xy, fluid.xy))));
+            water.depth = ocean ? mix(min(still, depth + 5.0), depth, part) : depth;
+            water.normal = normalize(mix(vec3(0.0, 1.0, 0.0), mat3(camera) * n, part));
+            water.fluid = part;
+            water.place = eye.xyz + ray * water.depth;
+            return water;
+        }
+    }
+    // No particle: the ocean. Inside the window a hole is the inside of a boat.
+    if (ocean && !(mesh_there && fluid_part((eye.xyz + ray * still).xz) > 0.5)) {
+        water.depth = still;
+        water.place = eye.xyz + ray * still;
+    }
+    return water;
+}
+
+vec3 backdrop(vec3 ray) {
+    vec3 direction = normalize(ray), c = sky(direction);
+    if (edge.w > 0.0 && ray.y < -1e-4) {
+        float depth = (ground.x - eye.y) / ray.y;
+        if (depth > 0.0) {
+            float far = depth * length(ray), pixel = far * size.w * 2.0 * lens.y / max(-direction.y, 0.02);
+            vec2 p = (eye.xyz + ray * depth).xz + ground.yz;
+            vec2 d = abs(fract(p + 0.5) - 0.5);
+            vec2 on = (1.0 - smoothstep(vec2(0.006), vec2(0.006 + pixel), d)) * clamp(1.2 - pixel * 3.0, 0.0, 1.0);
+            vec3 floor_color = vec3(0.66, 0.68, 0.69) - 0.10 * max(on.x, on.y);
+            c = mix(floor_color, haze(direction), 1.0 - exp(-0.035 * far));
+        }
+    }
+    return c;
+}
+
+// What lies behind the surface, seen through the ripples: colour, and metres of water in between.
+vec4 see_through(Water water, vec3 ray, vec2 bend, float thickness, vec3 deep) {
+    float own_depth = texelFetch(mesh_depth_image, ivec2(gl_FragCoord.xy), 0).r;
+    vec2 at = uv + bend * 0.035;
+    float buffer = textureLod(mesh_depth_image, at, 0.0).r;
+    if (mesh_depth(buffer) <= water.depth) { // that one stands in front of the water
+        at = uv;
+        buffer = own_depth;
+    }
+    bool mesh_behind = buffer < 1.0;
+    float under = mesh_behind ? max(mesh_depth(buffer) - water.depth, 0.0) * length(ray) : edge.z > 0.0 ? 8.0 : 3.0;
+    // In the air only what is thick is a body of water; the rest are sheets.
+    if (edge.z == 0.0 || water.place.y > eye.w + 0.25)
+        under = mix(min(under, thickness), under, smoothstep(0.18, 0.40, thickness));
+    vec3 behind = mesh_behind ? textureLod(mesh_image, at, 0.0).rgb
+                              : edge.z > 0.0 && ray.y < 0.0 ? deep : backdrop(ray + mat3(camera) * vec3(bend * 0.1, 0.0));
+    return vec4(behind, under);
+}
+
+// White water: cells of foam that close up as there is more of it.
+float foam_cover(vec2 p, vec2 slopes, float amount, float footprint) {
+    vec2 q = p + ground.yz;
+    float coarse = ripple_layer(2, p + slopes * 0.08, footprint).z, fine = ripple_layer(3, p, footprint).w;
+    float pattern = 0.58 * coarse + 0.42 * fine;
+    float dense = 1.0 - exp(-1.1 * amount);
+    return clamp(smoothstep(0.85 - dense, 2.0 - 1.2 * dense, pattern + 0.25 * dense) * min(1.0, 4.0 * dense), 0.0, 0.95);
+}
+
+vec3 shade(Water water, vec3 ray) {
+    vec3 direction = normalize(ray), n = water.normal;
+    float far = water.depth * length(ray);
+    float footprint = far * 2.0 * lens.y * size.w * inversesqrt(max(abs(direction.y), 0.03));
+    vec2 slopes = ripple_slopes(water.place.xz, footprint) * smoothstep(0.2, 0.75, n.y);
+    n = normalize(n - vec3(slopes.x, 0.0, slopes.y) * (1.0 - 0.3 * water.fluid));
+    float facing = dot(n, direction);
+    if (facing > -0.03) { // turned away: as steep as can be seen
+        n = normalize(n - direction * (facing + 0.04));
+        facing = dot(n, direction);
+    }
+    float grazing = 1.0 + facing, grazing_sq = grazing * grazing;
+    float mirror = min(0.02 + 0.98 * grazing_sq * grazing_sq * grazing, 0.82);
+    vec3 up = reflect(direction, n);
+    // Ripples too small to see still tilt what is seen: far water mirrors a higher sky.
+    up.y = abs(up.y) + 0.02 + 0.16 * ground.w * smoothstep(0.02, 0.6, footprint);
+    up = normalize(up);
+    vec3 mirrored = sky(up);
+    float towards_sun = max(dot(up, sun.xyz), 0.0);
+    float glint = 2.4 * pow(towards_sun, 1000.0) + 0.20 * pow(towards_sun, 90.0);
+    vec2 bend = (mat3(view) * (n - vec3(0.0, 1.0, 0.0))).xy;
+    vec4 mesh_mirrored = textureLod(reflection_image, uv + bend * vec2(0.16, 0.20) / max(1.0, 0.5 * far), 0.0);
+    mirrored = mix(mirrored, mesh_mirrored.rgb, mesh_mirrored.a);
+    glint *= 1.0 - mesh_mirrored.a;
+
+    vec2 sums = textureLod(thickness_image, uv, 0.0).rg;
+    bool ocean = edge.z > 0.0;
+    vec3 deep = ocean ? vec3(0.008, 0.125, 0.185) : vec3(0.02, 0.30, 0.38);
+    vec3 absorption = ocean ? vec3(3.2, 1.05, 0.75) : vec3(1.5, 0.38, 0.22);
+    // Light through thin crests and steep faces.
+    float crest = clamp((water.place.y - eye.w) * 4.0 + 0.10, 0.0, 1.0) * water.fluid;
+    float through = 0.5 - 0.5 * dot(direction, sun.xyz);
+    deep += vec3(0.008, 0.135, 0.125) * crest * (0.35 + 0.65 * through);
+    deep += vec3(0.0, 0.020, 0.024) * min((1.0 - n.y) * 5.0, 1.5);
+    float foam = sums.g * water.fluid;
+    deep += vec3(0.03, 0.16, 0.16) * (1.0 - exp(-0.6 * foam)); // bubbles below
+    vec4 behind = see_through(water, ray, bend, mix(4.0, sums.r, water.fluid), deep);
+    vec3 clear = exp(-absorption * behind.a);
+    vec3 c = mix(behind.rgb * clear + deep * (1.0 - clear), mirrored, mirror) + vec3(1.0, 0.88, 0.68) * glint;
+    float light = 0.78 + 0.26 * max(dot(n, sun.xyz), 0.0);
+    if (foam > 0.01)
+        c = mix(c, vec3(0.93, 0.97, 1.0) * light, foam_cover(water.place.xz, slopes, foam, footprint));
+    return ocean ? mix(c, haze(direction), 1.0 - exp(-0.0035 * max(far - 6.0, 0.0))) : c;
+}
+
+// Leaves all but the brightest as it is.
+vec3 display(vec3 c) {
+    vec3 over = max(c - 0.75, 0.0);
+    return min(c, vec3(0.75)) + 0.25 * (1.0 - exp(-4.0 * over));
+}
+
+void main() {
+    vec3 ray = local_ray(uv);
+    vec4 mesh = texelFetch(mesh_image, ivec2(gl_FragCoord.xy), 0);
+    float solid = mesh_depth(texelFetch(mesh_depth_image, ivec2(gl_FragCoord.xy), 0).r);
+    Water water = find_water(ray, mesh.a > 0.5);
+    vec3 c;
+    if (water.depth < solid || (water.depth < NEVER && mesh.a < 0.5))
+        c = shade(water, ray);
+    else
+        c = mesh.a > 0.5 ? mesh.rgb : backdrop(ray);
+    color = vec4(display(c), 1.0);
+}
