@@ -2,7 +2,7 @@
 #ifndef SKIFF_APP_CLI_H
 #define SKIFF_APP_CLI_H
 
-#include "engine/skiff.h"
+#include "engine/base/err.h"
 
 enum { CLI_MAX_EDITS = 64 };
 

@@ -8,5 +8,7 @@
 bool run_command(const CliArgs *args, Err *err);
 bool check_command(const CliArgs *args, Err *err);
 bool bench_command(const CliArgs *args, Err *err);
+bool render_command(const CliArgs *args, Err *err);
+bool gl_info_command(const CliArgs *args, Err *err);
 
 #endif

@@ -9,10 +9,13 @@
 
 #include "engine/base/state_file.h"
 
+#include <dirent.h>
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 enum { FRAME_VERSION = 1, BODY_SCALARS = 10, STATE_SCALARS = 15 };
 
@@ -333,4 +336,77 @@ bool frame_load(Frame *frame, const char *path, int body_count, Err *err) {
     if (!ok)
         frame_free(frame);
     return ok;
+}
+
+/* ---- Results of a run ---- */
+
+enum { PATH_SIZE = 4096 };
+
+const char *frame_path(const char *output, const char *folder, int number, const char *suffix, size_t size,
+                       char *path) {
+    snprintf(path, size, "%.4000s/%s/frame_%06d.%s", output, folder, number, suffix);
+    return path;
+}
+
+static bool remove_file(const char *path, Err *err) {
+    return unlink(path) == 0 || errno == ENOENT ||
+           err_set(err, ERR_IO, "%s: cannot be replaced: %s", path, strerror(errno));
+}
+
+/* The number in "frame_NNNNNN.SUFFIX", 0 for other names. `rest` receives SUFFIX. */
+static int number_of(const char *name, const char **rest) {
+    int number = 0, end = 0;
+    bool matches = sscanf(name, "frame_%d.%n", &number, &end) == 1 && end > 0 && number > 0;
+    *rest = name + end;
+    return matches ? number : 0;
+}
+
+int frames_last(const char *output, const char *folder, const char *suffix) {
+    char path[PATH_SIZE];
+    int last = 0;
+    snprintf(path, sizeof path, "%.4000s/%s", output, folder);
+    DIR *directory = opendir(path);
+    for (struct dirent *entry = directory ? readdir(directory) : NULL; entry; entry = readdir(directory)) {
+        const char *rest;
+        int number = number_of(entry->d_name, &rest);
+        if (number > last && strcmp(rest, suffix) == 0)
+            last = number;
+    }
+    if (directory)
+        closedir(directory);
+    return last;
+}
+
+bool frames_remove_sequence(const char *output, const char *folder, const char *suffix, Err *err) {
+    char path[PATH_SIZE], temporary[32]; /* what a crash left */
+    snprintf(temporary, sizeof temporary, "%s.tmp", suffix);
+    snprintf(path, sizeof path, "%.4000s/%s", output, folder);
+    DIR *directory = opendir(path);
+    if (!directory)
+        return errno == ENOENT || err_set(err, ERR_IO, "%s: cannot open: %s", path, strerror(errno));
+    bool ok = true;
+    for (struct dirent *entry = readdir(directory); ok && entry; entry = readdir(directory)) {
+        const char *rest;
+        if (number_of(entry->d_name, &rest) == 0 ||
+            (strcmp(rest, suffix) != 0 && strcmp(rest, temporary) != 0))
+            continue;
+        snprintf(path, sizeof path, "%.3000s/%s/%.255s", output, folder, entry->d_name);
+        ok = remove_file(path, err);
+    }
+    closedir(directory);
+    snprintf(path, sizeof path, "%.4000s/%s", output, folder);
+    rmdir(path); /* a folder with other things in it stays */
+    return ok;
+}
+
+bool frames_remove(const char *output, Err *err) {
+    static const char *const names[] = {"video.mp4", "video.mp4.tmp"};
+    char path[PATH_SIZE];
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        snprintf(path, sizeof path, "%.4000s/%s", output, names[i]);
+        if (!remove_file(path, err))
+            return false;
+    }
+    return frames_remove_sequence(output, "frames", "png", err) &&
+           frames_remove_sequence(output, "particles", "skiff", err);
 }

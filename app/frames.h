@@ -5,6 +5,7 @@
 #include "engine/skiff.h"
 
 enum { FRAME_TEXT_SIZE = 64 };
+static const double frame_time_tolerance = 1e-7; /* s: two times this close are the same */
 
 typedef struct FrameBody {
     double position[3]; /* of the centre of mass, world, m */
@@ -64,5 +65,17 @@ bool frame_window_distances(const SkiffSim *sim, const float (*points)[4], uint3
 bool frame_save(const Frame *frame, const char *path, Err *err);
 /* ERR_INPUT when the file is missing, damaged or has another number of bodies. The frame is then empty. */
 bool frame_load(Frame *frame, const char *path, int body_count, Err *err);
+
+/* OUTPUT/FOLDER/frame_NNNNNN.SUFFIX; number from 1 on. */
+const char *frame_path(const char *output, const char *folder, int number, const char *suffix, size_t size,
+                       char *path);
+
+/* The largest number of such files; 0: there are none. */
+int frames_last(const char *output, const char *folder, const char *suffix);
+
+/* Removes such files, and the folder if that leaves it empty. */
+bool frames_remove_sequence(const char *output, const char *folder, const char *suffix, Err *err);
+/* Removes the frames, the particles and the film of an earlier run. */
+bool frames_remove(const char *output, Err *err);
 
 #endif

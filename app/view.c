@@ -7,22 +7,20 @@
  * Foam and smoothed cameras remember the frames before; after --resume they begin anew. */
 #include "view.h"
 
+#include "edge_map.h"
 #include "foam.h"
 #include "nearest.h"
+#include "shade.h"
 
 #include "engine/base/file.h"
 #include "engine/base/log.h"
 #include "render/gfx.h"
 
-#include <dirent.h>
-#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
-enum { PATH_SIZE = 4096, QUEUE_LENGTH = 4, EDGE_MAP_MAX = 512 };
-static const double time_tolerance = 1e-7; /* s: two times this close are the same */
+enum { PATH_SIZE = 4096, QUEUE_LENGTH = 4 };
 
 typedef struct ViewCamera {
     const char *name;
@@ -58,9 +56,7 @@ struct View {
     GfxInstance *instances; /* bodies, then the tank */
     uint32_t instance_count;
     int hero; /* the body that cameras follow and whose speed is shown; -1: none */
-    float *edge_map;
-    uint32_t edge_size[2];
-    float edge_min[2], edge_max[2];
+    EdgeMap edge_map;
     bool has_tank;
     float floor; /* local y of the lowest water at the start, or of the tank */
 
@@ -390,52 +386,19 @@ static void place_bodies(View *view, const Frame *frame) {
     }
 }
 
-/* ---- The window's edge ---- */
-
-/* Samples the distance to the edge around the water of the first frame, which fills the window. The map is
- * local, and so is the window: it never changes. */
-static bool make_edge_map(View *view, const SkiffSim *sim, Err *err) {
-    const float margin = 1.0f; /* m */
-    Bounds bounds = bounds_of_water(&view->frame);
-    if (!view->frame.has_window || view->frame.live == 0)
-        return true;
-    uint32_t *size = view->edge_size;
-    for (int k = 0; k < 2; k++) {
-        view->edge_min[k] = (float)bounds.min[2 * k] - margin;
-        view->edge_max[k] = (float)bounds.max[2 * k] + margin;
-        float cells = (view->edge_max[k] - view->edge_min[k]) / (2 * view->frame.spacing);
-        size[k] = 2 + (uint32_t)fminf(cells, EDGE_MAP_MAX - 2);
-    }
-    uint32_t count = size[0] * size[1];
-    float(*points)[4] = calloc(count, sizeof *points);
-    view->edge_map = calloc(count, sizeof *view->edge_map);
-    bool ok = points && view->edge_map;
-    for (uint32_t i = 0; ok && i < count; i++) {
-        const uint32_t at[2] = {i % size[0], i / size[0]};
-        for (int k = 0; k < 2; k++)
-            points[i][2 * k] = view->edge_min[k] +
-                               (float)at[k] * (view->edge_max[k] - view->edge_min[k]) / (float)(size[k] - 1);
-        points[i][1] = (float)(view->frame.level - view->frame.origin[1]);
-    }
-    if (ok)
-        frame_window_distances(sim, (const float(*)[4])points, count, view->edge_map);
-    for (uint32_t i = 0; ok && i < count; i++)
-        view->edge_map[i] = -view->edge_map[i]; /* the renderer counts inwards */
-    free(points);
-    return ok || err_set(err, ERR_INPUT, "not enough memory for the map of the window's edge");
-}
+/* ---- The water around ---- */
 
 static GfxOcean ocean_of(const View *view, const Frame *frame) {
     const SceneRender *render = &view->options.render;
     GfxOcean ocean = gfx_scene_default().ocean;
     ocean.ripples = render->ripples;
-    ocean.enabled = frame->has_window && view->edge_map;
+    ocean.enabled = frame->has_window && view->edge_map.distance;
     if (ocean.enabled) {
         ocean.level = (float)(frame->level - frame->origin[1]);
-        ocean.edge_distance = view->edge_map;
-        memcpy(ocean.edge_size, view->edge_size, sizeof ocean.edge_size);
-        memcpy(ocean.edge_min, view->edge_min, sizeof ocean.edge_min);
-        memcpy(ocean.edge_max, view->edge_max, sizeof ocean.edge_max);
+        ocean.edge_distance = view->edge_map.distance;
+        memcpy(ocean.edge_size, view->edge_map.size, sizeof ocean.edge_size);
+        memcpy(ocean.edge_min, view->edge_map.min, sizeof ocean.edge_min);
+        memcpy(ocean.edge_max, view->edge_map.max, sizeof ocean.edge_max);
         ocean.blend[0] = render->fade ? 0.15f * render->fade_edge : 0;
         ocean.blend[1] = render->fade ? render->fade_edge : 0.01f * frame->spacing;
         return ocean;
@@ -450,64 +413,6 @@ static GfxOcean ocean_of(const View *view, const Frame *frame) {
 
 /* ---- What each particle shows ---- */
 
-static float smooth(float value) {
-    float t = fmaxf(0, fminf(1, value));
-    return t * t * (3 - 2 * t);
-}
-
-/* 0 (not there) .. 1. What existed at the start of the simulation has always been there. */
-static float fade_of(const View *view, const Frame *frame, uint32_t i) {
-    const SceneRender *render = &view->options.render;
-    float age = (float)(frame->time - frame->birth[i]);
-    bool is_new = frame->birth[i] > view->start + time_tolerance;
-    if (is_new && age < 0)
-        return 0; /* comes at the end of this step */
-    if (!render->fade)
-        return i < frame->live;
-    float fade = is_new ? smooth(age / render->fade_in) : 1;
-    if (i >= frame->live)
-        fade *= 1 - smooth(frame->gone[i] / render->fade_out);
-    if (frame->has_window && render->look == GFX_LOOK_PARTICLES) /* water: the ocean takes over */
-        fade *= smooth(-frame->edge[i] / render->fade_edge);
-    return fade;
-}
-
-static float field_of(const Frame *frame, int field, uint32_t i) {
-    const float *v = frame->velocity[i];
-    switch ((RenderField)field) {
-    case RENDER_SPEED:
-        return sqrtf(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-    case RENDER_DENSITY:
-        return frame->density[i];
-    case RENDER_PRESSURE:
-        return frame->pressure[i];
-    case RENDER_AGE:
-        return (float)(frame->time - frame->birth[i]);
-    case RENDER_WINDOW:
-        return frame->has_window ? -frame->edge[i] : 0;
-    case RENDER_FIELD_COUNT:
-        break;
-    }
-    return 0;
-}
-
-static GfxField legend_of(const SceneRender *render) {
-    static const GfxField fields[RENDER_FIELD_COUNT] = {
-        [RENDER_SPEED] = {0, 3, "speed", "m/s"},
-        [RENDER_DENSITY] = {0.9f, 1.05f, "density / rest density", ""},
-        [RENDER_PRESSURE] = {0, 10000, "pressure", "Pa"},
-        [RENDER_AGE] = {0, 5, "age", "s"},
-        [RENDER_WINDOW] = {0, 1, "distance from the edge", "m"},
-    };
-    GfxField field = fields[render->field];
-    field.min = isnan(render->field_min) ? field.min : render->field_min;
-    field.max = isnan(render->field_max) ? field.max : render->field_max;
-    if (!(field.min < field.max)) /* one end given, beyond the default of the other */
-        *(isnan(render->field_min) ? &field.min : &field.max) =
-            isnan(render->field_min) ? field.max - 1 : field.min + 1;
-    return field;
-}
-
 static bool reserve_scalars(View *view, uint32_t count, Err *err) {
     if (count <= view->scalar_capacity && view->scalars)
         return true;
@@ -520,10 +425,8 @@ static bool reserve_scalars(View *view, uint32_t count, Err *err) {
 
 static GfxParticles particles_of(View *view, const Frame *frame) {
     float *fade = view->scalars, *foam = fade + view->scalar_capacity, *field = foam + view->scalar_capacity;
-    for (uint32_t i = 0; i < frame->count; i++) {
-        fade[i] = fade_of(view, frame, i);
-        field[i] = field_of(frame, view->options.render.field, i);
-    }
+    shade_fade(&view->options.render, frame, view->start, fade);
+    shade_field((RenderField)view->options.render.field, frame, field);
     return (GfxParticles){.count = frame->count,
                           .spacing = frame->spacing,
                           .position = (const float(*)[4])frame->position,
@@ -570,12 +473,6 @@ static void draw_figures(const View *view, const Frame *frame) {
     gfx_hud_draw(view->hud, (GfxImage){view->rgb, render->width, render->height}, &values);
 }
 
-static const char *frame_path(const View *view, const char *folder, int number, const char *suffix,
-                              char path[PATH_SIZE]) {
-    snprintf(path, PATH_SIZE, "%.4000s/%s/frame_%06d.%s", view->output, folder, number, suffix);
-    return path;
-}
-
 static bool draw(View *view, const Frame *frame, int number, Err *err) {
     char path[PATH_SIZE];
     if (!reserve_scalars(view, frame->count, err) ||
@@ -592,7 +489,8 @@ static bool draw(View *view, const Frame *frame, int number, Err *err) {
     scene.instance_count = view->instance_count;
     scene.camera = local_camera(&seen, frame->origin, &scene.camera);
     scene.ocean = ocean_of(view, frame);
-    scene.field = legend_of(&view->options.render);
+    ShadeLegend legend = shade_legend(&view->options.render);
+    scene.field = (GfxField){legend.min, legend.max, legend.title, legend.unit};
     scene.ground = !scene.ocean.enabled && view->has_tank;
     scene.ground_level = view->floor;
     memcpy(scene.sun, view->options.render.sun, sizeof scene.sun);
@@ -602,8 +500,8 @@ static bool draw(View *view, const Frame *frame, int number, Err *err) {
         return false;
     draw_figures(view, frame);
     view->drawn++;
-    return gfx_writer_add(view->writer, frame_path(view, "frames", number, "png", path), view->video,
-                          view->rgb, err);
+    return gfx_writer_add(view->writer, frame_path(view->output, "frames", number, "png", sizeof path, path),
+                          view->video, view->rgb, err);
 }
 
 /* ---- Life ---- */
@@ -642,7 +540,7 @@ static bool make_picture(View *view, const SkiffSim *sim, Err *err) {
     if (render->hud != RENDER_HUD_OFF && !(view->hud = gfx_hud_create(def.height, err)))
         return false;
     return make_cameras(view, sim, err) && make_meshes(view, sim, level, err) &&
-           make_edge_map(view, sim, err);
+           edge_map_make(&view->edge_map, sim, &view->frame, err);
 }
 
 View *view_create(const ViewOptions *options, const Scene *scene, const SkiffSim *sim, Err *err) {
@@ -678,13 +576,14 @@ static double time_of(const View *view, const Sequence *sequence) {
 static bool save(View *view, int number, Err *err) {
     char path[PATH_SIZE];
     view->frame.rate = view->save.rate;
-    return frame_save(&view->frame, frame_path(view, "particles", number, "skiff", path), err);
+    return frame_save(&view->frame, frame_path(view->output, "particles", number, "skiff", sizeof path, path),
+                      err);
 }
 
 /* Draws and saves all that is due by now. */
 static bool catch_up(View *view, const SkiffSim *sim, const FrameBody *before, const ViewControls *controls,
                      Err *err) {
-    double now = skiff_time(sim) + time_tolerance;
+    double now = skiff_time(sim) + frame_time_tolerance;
     for (;;) {
         double draw_time = time_of(view, &view->draw), save_time = time_of(view, &view->save);
         double time = fmin(draw_time, save_time);
@@ -694,9 +593,9 @@ static bool catch_up(View *view, const SkiffSim *sim, const FrameBody *before, c
             return false;
         view->frame.controls = controls->driven;
         view->step_ms = controls->step_ms;
-        if (save_time <= time + time_tolerance && !save(view, view->save.next++, err))
+        if (save_time <= time + frame_time_tolerance && !save(view, view->save.next++, err))
             return false;
-        if (draw_time <= time + time_tolerance && !draw(view, &view->frame, view->draw.next++, err))
+        if (draw_time <= time + frame_time_tolerance && !draw(view, &view->frame, view->draw.next++, err))
             return false;
     }
 }
@@ -707,21 +606,21 @@ static bool add_old_frames(View *view, Err *err) {
     char path[PATH_SIZE];
     int first = view->options.first;
     for (int i = first; i < view->draw.next; i++)
-        if (!file_exists(frame_path(view, "frames", i, "png", path))) {
+        if (!file_exists(frame_path(view->output, "frames", i, "png", sizeof path, path))) {
             log_write(LOG_WARNING, "%s: there is no such frame; video.mp4 begins where the run goes on",
                       path);
             return true;
         }
     for (int i = first; i < view->draw.next; i++)
-        if (!gfx_png_read(frame_path(view, "frames", i, "png", path), view->rgb, render->width,
-                          render->height, err) ||
+        if (!gfx_png_read(frame_path(view->output, "frames", i, "png", sizeof path, path), view->rgb,
+                          render->width, render->height, err) ||
             !gfx_writer_add(view->writer, NULL, view->video, view->rgb, err))
             return false;
     return true;
 }
 
 static void skip_to(const View *view, Sequence *sequence, double time) {
-    while (time_of(view, sequence) <= time + time_tolerance)
+    while (time_of(view, sequence) <= time + frame_time_tolerance)
         sequence->next++;
 }
 
@@ -776,6 +675,8 @@ int view_frame_count(const View *view) {
 }
 
 bool view_finish(View *view, Err *err) {
+    if (!view)
+        return true;
     bool ok = gfx_writer_finish(view->writer, err);
     view->writer = NULL;
     if (view->video && ok)
@@ -798,45 +699,8 @@ void view_destroy(View *view) {
     free(view->rgb);
     free(view->cameras);
     free(view->instances);
-    free(view->edge_map);
+    edge_map_free(&view->edge_map);
     free(view->before);
     free(view->scalars);
     free(view);
-}
-
-/* ---- Results of an earlier run ---- */
-
-/* Files frame_NNNNNN.suffix and what a crash left of them. */
-static bool remove_sequence(const char *output, const char *folder, const char *suffix, Err *err) {
-    char path[PATH_SIZE], name[300];
-    snprintf(path, sizeof path, "%.4000s/%s", output, folder);
-    DIR *directory = opendir(path);
-    if (!directory)
-        return errno == ENOENT || err_set(err, ERR_IO, "%s: cannot open: %s", path, strerror(errno));
-    bool ok = true;
-    for (struct dirent *entry = readdir(directory); ok && entry; entry = readdir(directory)) {
-        int number, end = 0;
-        if (sscanf(entry->d_name, "frame_%d.%n", &number, &end) != 1 || end == 0)
-            continue;
-        snprintf(name, sizeof name, "%s.tmp", suffix);
-        if (strcmp(entry->d_name + end, suffix) != 0 && strcmp(entry->d_name + end, name) != 0)
-            continue;
-        snprintf(path, sizeof path, "%.3000s/%s/%.255s", output, folder, entry->d_name);
-        if (unlink(path) != 0)
-            ok = err_set(err, ERR_IO, "%s: cannot be replaced: %s", path, strerror(errno));
-    }
-    closedir(directory);
-    return ok;
-}
-
-bool view_remove(const char *output, Err *err) {
-    static const char *const names[] = {"video.mp4", "video.mp4.tmp"};
-    char path[PATH_SIZE];
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
-        snprintf(path, sizeof path, "%.4000s/%s", output, names[i]);
-        if (unlink(path) != 0 && errno != ENOENT)
-            return err_set(err, ERR_IO, "%s: cannot be replaced: %s", path, strerror(errno));
-    }
-    return remove_sequence(output, "frames", "png", err) &&
-           remove_sequence(output, "particles", "skiff", err);
 }

@@ -37,15 +37,12 @@ bool view_step(View *view, const SkiffSim *sim, const ViewControls *controls, Er
  * that --frames leaves out: foam and cameras have a memory. */
 bool view_saved(View *view, const Frame *frame, int number, Err *err);
 
-/* Waits for the last frame and ends the film. The view is only good for view_destroy then. */
+/* Waits for the last frame and ends the film. The view is only good for view_destroy then. NULL is fine. */
 bool view_finish(View *view, Err *err);
 /* Without view_finish the film is thrown away; frames are complete in any case. NULL is fine. */
 void view_destroy(View *view);
 
 /* Frames drawn so far, for a last message. */
 int view_frame_count(const View *view);
-
-/* Removes the frames, particles and film of an earlier run. */
-bool view_remove(const char *output, Err *err);
 
 #endif
