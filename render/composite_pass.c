@@ -1,12 +1,13 @@
-/* The picture of water: surface, ocean, reflections, what is below, foam, sky. All of it is in shaders/composite.frag. */
+/* The picture of water: surface, ocean, reflections, what is below, foam, sky. All of it is in
+ * shaders/composite.frag. */
 #include "pass.h"
 
 #include "shader.h"
 
 static bool create(Pass *pass, Frame *frame, Err *err) {
-    static const char *const samplers[] = {"mesh_image",       "mesh_depth_image", "reflection_image",
-                                           "normal_image",     "thickness_image",  "edge_image",
-                                           "sky_image",        "ripple_map",       NULL};
+    static const char *const samplers[] = {"mesh_image",   "mesh_depth_image", "reflection_image",
+                                           "normal_image", "thickness_image",  "edge_image",
+                                           "sky_image",    "ripple_map",       NULL};
     pass->programs[0] = shader_program(frame->gl, "fill.vert", "composite.frag", samplers, err);
     pass->framebuffers[0] = framebuffer_create(frame->gl, &frame->images[IMAGE_COMPOSED], NULL, err);
     return pass->programs[0] && pass->framebuffers[0];

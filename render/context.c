@@ -1,9 +1,9 @@
 /* Three ways to OpenGL without a screen, behind one table: EGL on a device, EGL "surfaceless" (Mesa), OSMesa.
  *
- * The libraries are opened at run time with RTLD_LOCAL: libEGL (libGL) and libOSMesa define 1292 symbols alike and crash
- * when linked together, and a program that draws nothing should need neither. They are never closed again: Mesa leaves
- * threads and exit handlers behind that need their code. Displays are not terminated either, since eglTerminate ends
- * them for every context of the process.
+ * The libraries are opened at run time with RTLD_LOCAL: libEGL (libGL) and libOSMesa define 1292 symbols
+ * alike and crash when linked together, and a program that draws nothing should need neither. They are never
+ * closed again: Mesa leaves threads and exit handlers behind that need their code. Displays are not
+ * terminated either, since eglTerminate ends them for every context of the process.
  *
  * All draw into framebuffer objects; the context's own surface is none (EGL) or 16 x 16 (OSMesa). */
 #include "context.h"
@@ -150,8 +150,7 @@ static GlGetProc egl_device_open(Context *context, Err *err) {
     EglApi *egl = &context->egl;
     if (!egl_load(egl, err))
         return NULL;
-    PFNEGLQUERYDEVICESEXTPROC query_devices =
-        (PFNEGLQUERYDEVICESEXTPROC)egl->get_proc("eglQueryDevicesEXT");
+    PFNEGLQUERYDEVICESEXTPROC query_devices = (PFNEGLQUERYDEVICESEXTPROC)egl->get_proc("eglQueryDevicesEXT");
     PFNEGLQUERYDEVICESTRINGEXTPROC query_string =
         (PFNEGLQUERYDEVICESTRINGEXTPROC)egl->get_proc("eglQueryDeviceStringEXT");
     PFNEGLGETPLATFORMDISPLAYEXTPROC get_display =
@@ -221,7 +220,8 @@ static GlGetProc osmesa_open(Context *context, Err *err) {
     if (!library)
         library = dlopen("libOSMesa.so.6", RTLD_NOW | RTLD_LOCAL);
     if (!library) {
-        err_set(err, ERR_GL, "cannot open libOSMesa.so.8 or .6 (%s; Mesa 25.1 and later have none)", dlerror());
+        err_set(err, ERR_GL, "cannot open libOSMesa.so.8 or .6 (%s; Mesa 25.1 and later have none)",
+                dlerror());
         return NULL;
     }
     if (!find_symbol(library, "OSMesaCreateContextAttribs", &osmesa->create, err) ||
@@ -291,7 +291,8 @@ Context *context_open(GfxBackend wanted, Gl *gl, Err *err) {
             packages = backend->packages;
     }
     free(context);
-    err_set(err, ERR_GL, "no usable OpenGL 3.3 without a screen:\n%s\non Debian: apt-get install %s", failures.message,
+    err_set(err, ERR_GL, "no usable OpenGL 3.3 without a screen:\n%s\non Debian: apt-get install %s",
+            failures.message,
             wanted == GFX_BACKEND_AUTO ? "libegl1 libegl-mesa0 libgl1-mesa-dri (or libosmesa6)" : packages);
     return NULL;
 }

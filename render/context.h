@@ -7,8 +7,8 @@
 
 typedef struct Context Context;
 
-/* Opens the wanted back end, or for GFX_BACKEND_AUTO the first that works, makes it current and loads `gl`. ERR_GL: one
- * line for each that was tried, and one with the packages to install. */
+/* Opens the wanted back end, or for GFX_BACKEND_AUTO the first that works, makes it current and loads `gl`.
+ * ERR_GL: one line for each that was tried, and one with the packages to install. */
 Context *context_open(GfxBackend wanted, Gl *gl, Err *err);
 void context_close(Context *context);
 

@@ -1,5 +1,6 @@
-/* Eye depth of the water's body, less that of still water in the same pixel: smoothing the difference leaves no streaks
- * where one looks along the surface. Blending with MIN instead of a depth buffer is 1.4 times faster in software. */
+/* Eye depth of the water's body, less that of still water in the same pixel: smoothing the difference leaves
+ * no streaks where one looks along the surface. Blending with MIN instead of a depth buffer is 1.4 times
+ * faster in software. */
 #include "pass.h"
 
 #include "shader.h"

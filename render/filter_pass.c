@@ -1,5 +1,5 @@
-/* Smooths the water's depth: the narrow-range filter of [Truong & Yuksel 2018] along rows, then along columns, then a
- * 3 x 3 mean. The result is in IMAGE_DEPTH_WORK. */
+/* Smooths the water's depth: the narrow-range filter of [Truong & Yuksel 2018] along rows, then along
+ * columns, then a 3 x 3 mean. The result is in IMAGE_DEPTH_WORK. */
 #include "pass.h"
 
 #include "shader.h"
@@ -12,7 +12,8 @@ static const char *const samplers[] = {"depth_image", NULL};
 
 static bool create(Pass *pass, Frame *frame, Err *err) {
     pass->programs[0] = shader_program(frame->gl, "fill.vert", "filter.frag", samplers, err);
-    pass->programs[1] = pass->programs[0] ? shader_program(frame->gl, "fill.vert", "clean.frag", samplers, err) : 0;
+    pass->programs[1] =
+        pass->programs[0] ? shader_program(frame->gl, "fill.vert", "clean.frag", samplers, err) : 0;
     if (!pass->programs[1])
         return false;
     pass->framebuffers[0] = framebuffer_create(frame->gl, &frame->images[IMAGE_DEPTH], NULL, err);

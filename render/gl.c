@@ -1,5 +1,5 @@
-/* Fills the table of GL entry points by name. Nothing but the list in gl.h is looked up: a pass that needs another entry
- * point adds a row there. */
+/* Fills the table of GL entry points by name. Nothing but the list in gl.h is looked up: a pass that needs
+ * another entry point adds a row there. */
 #include "gl.h"
 
 #include <stdio.h>

@@ -1,5 +1,5 @@
-/* OpenGL 3.3 core as one table of entry points, found by name at run time. No GL library is linked: libGL and libOSMesa
- * define the same symbols and cannot live in one process otherwise. */
+/* OpenGL 3.3 core as one table of entry points, found by name at run time. No GL library is linked: libGL and
+ * libOSMesa define the same symbols and cannot live in one process otherwise. */
 #ifndef SKIFF_GL_H
 #define SKIFF_GL_H
 

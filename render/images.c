@@ -36,7 +36,8 @@ bool images_create(Frame *frame, Err *err) {
             continue;
         int width = divisor ? (frame->width + divisor - 1) / divisor : SKY_EDGE;
         int height = divisor ? (frame->height + divisor - 1) / divisor : SKY_EDGE;
-        frame->images[id] = texture_create(frame->gl, table[id].format, width, height, table[id].sampling, NULL);
+        frame->images[id] =
+            texture_create(frame->gl, table[id].format, width, height, table[id].sampling, NULL);
     }
     return gl_check(frame->gl, "images", err);
 }

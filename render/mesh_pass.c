@@ -1,4 +1,5 @@
-/* Boats, walls and ground; once as they are and once mirrored in still water, at half the size, for reflections. */
+/* Boats, walls and ground; once as they are and once mirrored in still water, at half the size, for
+ * reflections. */
 #include "pass.h"
 
 #include "shader.h"

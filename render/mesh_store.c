@@ -1,5 +1,6 @@
-/* Prepares meshes for drawing: corner normals that are smooth across shallow edges and sharp across steep ones, and the
- * steep edges as lines. Positions are taken as they come: vertices that should shade as one must be one. */
+/* Prepares meshes for drawing: corner normals that are smooth across shallow edges and sharp across steep
+ * ones, and the steep edges as lines. Positions are taken as they come: vertices that should shade as one
+ * must be one. */
 #include "mesh_store.h"
 
 #include <math.h>
@@ -21,7 +22,7 @@ typedef struct MeshEdge {
 
 /* Working memory of one mesh. */
 typedef struct MeshWork {
-    float (*area_normals)[3]; /* of triangles; length: twice the area */
+    float (*area_normals)[3];  /* of triangles; length: twice the area */
     uint32_t *starts, *around; /* triangles around vertex v: around[starts[v]] .. around[starts[v + 1] - 1] */
     MeshVertex *corners;
     MeshEdge *edges;
@@ -37,8 +38,8 @@ static bool check_mesh(const GfxMeshDef *def, int number, Err *err) {
     for (uint32_t i = 0; i < def->vertex_count; i++)
         for (int k = 0; k < 3; k++)
             if (!isfinite(def->vertices[i][k]))
-                return err_set(err, ERR_INPUT, "mesh %d: vertex %u has coordinate %c = %g", number, i, "xyz"[k],
-                               (double)def->vertices[i][k]);
+                return err_set(err, ERR_INPUT, "mesh %d: vertex %u has coordinate %c = %g", number, i,
+                               "xyz"[k], (double)def -> vertices[i][k]);
     for (uint32_t t = 0; t < def->triangle_count; t++)
         for (int k = 0; k < 3; k++)
             if (def->triangles[t][k] >= def->vertex_count)
@@ -126,9 +127,11 @@ static size_t fill_lines(const GfxMeshDef *def, MeshWork *work) {
     qsort(work->edges, count, sizeof *work->edges, compare_edges);
     for (size_t i = 0, next; i < count; i = next) {
         const MeshEdge *edge = &work->edges[i];
-        for (next = i + 1; next < count && work->edges[next].from == edge->from && work->edges[next].to == edge->to;)
+        for (next = i + 1;
+             next < count && work->edges[next].from == edge->from && work->edges[next].to == edge->to;)
             next++;
-        if (next == i + 2 && is_shallow(work->area_normals[edge->triangle], work->area_normals[edge[1].triangle]))
+        if (next == i + 2 &&
+            is_shallow(work->area_normals[edge->triangle], work->area_normals[edge[1].triangle]))
             continue;
         memcpy(work->lines[ends++], def->vertices[edge->from], sizeof(float[3]));
         memcpy(work->lines[ends++], def->vertices[edge->to], sizeof(float[3]));
@@ -142,13 +145,16 @@ static void upload_triangles(StoredMesh *mesh, const Gl *gl, const MeshWork *wor
     gl->GenBuffers(1, &mesh->buffer);
     gl->BindVertexArray(mesh->vertex_array);
     gl->BindBuffer(GL_ARRAY_BUFFER, mesh->buffer);
-    gl->BufferData(GL_ARRAY_BUFFER, (GLsizeiptr)((size_t)mesh->vertex_count * sizeof(MeshVertex)), work->corners,
-                   GL_STATIC_DRAW);
+    gl->BufferData(GL_ARRAY_BUFFER, (GLsizeiptr)((size_t)mesh->vertex_count * sizeof(MeshVertex)),
+                   work->corners, GL_STATIC_DRAW);
     for (GLuint i = 0; i < 3; i++)
         gl->EnableVertexAttribArray(i);
-    gl->VertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, sizeof(MeshVertex), (void *)offsetof(MeshVertex, position));
-    gl->VertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, sizeof(MeshVertex), (void *)offsetof(MeshVertex, normal));
-    gl->VertexAttribPointer(2, 3, GL_UNSIGNED_BYTE, GL_TRUE, sizeof(MeshVertex), (void *)offsetof(MeshVertex, color));
+    gl->VertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, sizeof(MeshVertex),
+                            (void *)offsetof(MeshVertex, position));
+    gl->VertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, sizeof(MeshVertex),
+                            (void *)offsetof(MeshVertex, normal));
+    gl->VertexAttribPointer(2, 3, GL_UNSIGNED_BYTE, GL_TRUE, sizeof(MeshVertex),
+                            (void *)offsetof(MeshVertex, color));
 }
 
 static void upload_lines(StoredMesh *mesh, const Gl *gl, const MeshWork *work, size_t ends) {

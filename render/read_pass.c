@@ -27,7 +27,8 @@ static bool draw(Pass *pass, Frame *frame, Err *err) {
     gl->PixelStorei(GL_PACK_ALIGNMENT, 1);
     gl->ReadPixels(0, 0, frame->width, frame->height, GL_RGBA, GL_UNSIGNED_BYTE, frame->pixels);
     for (int y = 0; y < frame->def.height; y++) {
-        const uint8_t *rows = frame->pixels + 4 * (size_t)frame->width * (size_t)(frame->height - (y + 1) * n);
+        const uint8_t *rows =
+            frame->pixels + 4 * (size_t)frame->width * (size_t)(frame->height - (y + 1) * n);
         uint8_t *rgb = frame->rgb + 3 * (size_t)frame->def.width * (size_t)y;
         average_row(rows, frame->width, n, rgb, frame->def.width);
     }

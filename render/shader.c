@@ -1,5 +1,5 @@
-/* Compiles GLSL 3.30 programs. Does not keep binaries: llvmpipe's compile time goes into machine code at the first draw,
- * which no binary would save. */
+/* Compiles GLSL 3.30 programs. Does not keep binaries: llvmpipe's compile time goes into machine code at the
+ * first draw, which no binary would save. */
 #include "shader.h"
 
 #include <stdio.h>

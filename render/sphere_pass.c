@@ -1,4 +1,5 @@
-/* Particles as spheres: the opaque ones with depth, then the fading ones from far to near over them, without. */
+/* Particles as spheres: the opaque ones with depth, then the fading ones from far to near over them, without.
+ */
 #include "pass.h"
 
 #include "shader.h"

@@ -1,4 +1,5 @@
-/* Droplets in front of the finished water. They are small and many: their order among each other is not seen. */
+/* Droplets in front of the finished water. They are small and many: their order among each other is not seen.
+ */
 #include "pass.h"
 
 #include "shader.h"
@@ -6,8 +7,8 @@
 static bool create(Pass *pass, Frame *frame, Err *err) {
     static const char *const samplers[] = {"depth_image", NULL};
     pass->programs[0] = shader_program(frame->gl, "spray.vert", "spray.frag", samplers, err);
-    pass->framebuffers[0] = framebuffer_create(frame->gl, &frame->images[IMAGE_COMPOSED],
-                                               &frame->images[IMAGE_MESH_DEPTH], err);
+    pass->framebuffers[0] =
+        framebuffer_create(frame->gl, &frame->images[IMAGE_COMPOSED], &frame->images[IMAGE_MESH_DEPTH], err);
     return pass->programs[0] && pass->framebuffers[0];
 }
 

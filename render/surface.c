@@ -1,12 +1,13 @@
 /* Which particles are drawn.
  *
- * Particles are counted in cubic cells of two spacings. A cell that holds less than a third of what water holds is open.
- * Particles whose cell touches an open one on the side of the eye are drawn: about two layers. Over an ocean the space
- * beside the window counts as full, as the ocean covers it. Particles alone in their neighbourhood become droplets:
- * smaller ones, scattered around the particle by its id, stretched along its path.
+ * Particles are counted in cubic cells of two spacings. A cell that holds less than a third of what water
+ * holds is open. Particles whose cell touches an open one on the side of the eye are drawn: about two layers.
+ * Over an ocean the space beside the window counts as full, as the ocean covers it. Particles alone in their
+ * neighbourhood become droplets: smaller ones, scattered around the particle by its id, stretched along its
+ * path.
  *
- * Counting is exact integer work in the order of the input, so that equal input gives equal lists. A few particles far
- * away only make the cells larger: more is drawn, never less. */
+ * Counting is exact integer work in the order of the input, so that equal input gives equal lists. A few
+ * particles far away only make the cells larger: more is drawn, never less. */
 #include "surface.h"
 
 #include <math.h>
@@ -18,11 +19,19 @@ enum {
     DROPLETS_EACH = 7,
     ISOLATED_AT_MOST = 3, /* particles in 27 cells, itself included */
 };
-enum { MEMORY_BODY, MEMORY_DROPLETS, MEMORY_FADING, MEMORY_SORTED, MEMORY_CELLS, MEMORY_COLUMNS, MEMORY_CELL_OF };
+enum {
+    MEMORY_BODY,
+    MEMORY_DROPLETS,
+    MEMORY_FADING,
+    MEMORY_SORTED,
+    MEMORY_CELLS,
+    MEMORY_COLUMNS,
+    MEMORY_CELL_OF
+};
 
-#define OPEN_PART     0.35f  /* a cell with less than this part of a full one is open */
-#define DROPLET_SHOW  0.012f /* s of path shown by a droplet's stretch */
-#define WATER_PART    0.8f   /* mass of a particle / (rho0 d^3) */
+#define OPEN_PART    0.35f  /* a cell with less than this part of a full one is open */
+#define DROPLET_SHOW 0.012f /* s of path shown by a droplet's stretch */
+#define WATER_PART   0.8f   /* mass of a particle / (rho0 d^3) */
 
 typedef struct Cells {
     int size[3]; /* with a margin of one empty cell on every side */
@@ -44,8 +53,8 @@ static bool find_bounds(const GfxParticles *particles, float min[3], float max[3
         for (int k = 0; k < 3; k++) {
             float x = particles->position[i][k];
             if (!isfinite(x))
-                return err_set(err, ERR_USAGE, "particle %u of %u has coordinate %c = %g", i, particles->count,
-                               "xyz"[k], (double)x);
+                return err_set(err, ERR_USAGE, "particle %u of %u has coordinate %c = %g", i,
+                               particles->count, "xyz"[k], (double)x);
             min[k] = x < min[k] ? x : min[k];
             max[k] = x > max[k] ? x : max[k];
         }
@@ -77,7 +86,8 @@ static bool make_cells(Cells *cells, Surface *surface, const GfxParticles *parti
     Buffer *memory = surface->memory;
     if (!buffer_reserve(&memory[MEMORY_CELLS], "surface cells", count * sizeof *cells->count, err) ||
         !buffer_reserve(&memory[MEMORY_COLUMNS], "surface columns", columns, err) ||
-        !buffer_reserve(&memory[MEMORY_CELL_OF], "surface particles", particles->count * sizeof *cells->cell_of, err))
+        !buffer_reserve(&memory[MEMORY_CELL_OF], "surface particles",
+                        particles->count * sizeof *cells->cell_of, err))
         return false;
     cells->count = memory[MEMORY_CELLS].data;
     cells->column = memory[MEMORY_COLUMNS].data;

@@ -1,5 +1,5 @@
-/* Chooses which particles are worth drawing, on the CPU: a vertex costs more than a pixel in software GL, and all but
- * the outermost two layers are hidden. */
+/* Chooses which particles are worth drawing, on the CPU: a vertex costs more than a pixel in software GL, and
+ * all but the outermost two layers are hidden. */
 #ifndef SKIFF_SURFACE_H
 #define SKIFF_SURFACE_H
 
@@ -26,8 +26,8 @@ typedef struct Surface {
     Buffer memory[8];
 } Surface;
 
-/* Fills the lists; memory is reused from call to call. ERR_USAGE: a particle is not finite (its index); ERR_INPUT: no
- * memory. */
+/* Fills the lists; memory is reused from call to call. ERR_USAGE: a particle is not finite (its index);
+ * ERR_INPUT: no memory. */
 bool surface_select(Surface *surface, const GfxScene *scene, GfxLook look, Err *err);
 void surface_free(Surface *surface);
 

@@ -1,5 +1,6 @@
-/* Metres of water and amount of foam along each ray, added up over the particles near the surface; at a quarter of the
- * size, as both are smooth. The sums depend on the order of the particles in the last bit, so that order is the input's. */
+/* Metres of water and amount of foam along each ray, added up over the particles near the surface; at a
+ * quarter of the size, as both are smooth. The sums depend on the order of the particles in the last bit, so
+ * that order is the input's. */
 #include "pass.h"
 
 #include "shader.h"
