@@ -125,11 +125,12 @@ static void between(const FrameBody *before, double share, FrameBody *body) {
 static void copy_particles(Frame *frame, const SkiffParticles *particles, float back) {
     size_t count = particles->count;
     memcpy(frame->velocity, particles->velocity, count * sizeof *frame->velocity);
-    memcpy(frame->density, particles->density, count * sizeof *frame->density);
-    memcpy(frame->pressure, particles->pressure, count * sizeof *frame->pressure);
     memcpy(frame->id, particles->id, count * sizeof *frame->id);
     memcpy(frame->birth, particles->birth, count * sizeof *frame->birth);
     for (size_t i = 0; i < count; i++) {
+        /* Before the first step neither is known: water at rest, not yet pressed. */
+        frame->density[i] = particles->density ? particles->density[i] : 1;
+        frame->pressure[i] = particles->pressure ? particles->pressure[i] : 0;
         frame->gone[i] = 0;
         for (int k = 0; k < 3; k++)
             frame->position[i][k] = particles->position[i][k] - particles->velocity[i][k] * back;

@@ -301,7 +301,7 @@ static bool run_scene(Run *run, Err *err) {
     if (!view_options_make(&options, run->args, run->scene, err))
         return false;
     if (view_options_needed(&options) && !(run->view = view_create(&options, run->scene, run->sim, err)))
-        return false;
+        return err->code != ERR_GL ? false : err_add(err, ERR_GL, "--no-render simulates without pictures");
     run->end_time = run->scene->def.start_time + run->scene->duration;
     if (!begin(run, err))
         return false;

@@ -43,7 +43,7 @@ static float field_of(RenderField field, const Frame *frame, uint32_t i) {
     case RENDER_DENSITY:
         return frame->density[i];
     case RENDER_PRESSURE:
-        return frame->pressure[i];
+        return 0.001f * frame->pressure[i]; /* kPa: short numbers in the legend */
     case RENDER_AGE:
         return (float)(frame->time - frame->birth[i]);
     case RENDER_WINDOW:
@@ -63,7 +63,7 @@ ShadeLegend shade_legend(const SceneRender *render) {
     static const ShadeLegend legends[RENDER_FIELD_COUNT] = {
         [RENDER_SPEED] = {0, 3, "speed", "m/s"},
         [RENDER_DENSITY] = {0.9f, 1.05f, "density / rest density", ""},
-        [RENDER_PRESSURE] = {0, 10000, "pressure", "Pa"},
+        [RENDER_PRESSURE] = {0, 10, "pressure", "kPa"},
         [RENDER_AGE] = {0, 5, "age", "s"},
         [RENDER_WINDOW] = {0, 1, "distance from the edge", "m"},
     };

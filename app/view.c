@@ -180,24 +180,43 @@ static void suit_body(GfxCameraDef *def, const SkiffSim *sim, int body) {
     }
 }
 
+static double dot(const double a[3], const double b[3]) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* From how far away, in the direction `from`, a box of these half lengths just fits into the picture. */
+static double fitting_distance(const double half[3], const double from[3], double fov_deg, double aspect) {
+    const double flat = hypot(from[0], from[2]);
+    const double right[3] = {from[2] / flat, 0, -from[0] / flat};
+    const double up[3] = {-from[1] * from[0] / flat, flat, -from[1] * from[2] / flat};
+    double slope = tan(0.5 * fov_deg * 3.14159265358979323846 / 180), distance = 0;
+    for (int c = 0; c < 8; c++) {
+        const double corner[3] = {c & 1 ? half[0] : -half[0], c & 2 ? half[1] : -half[1],
+                                  c & 4 ? half[2] : -half[2]};
+        double across = fmax(fabs(dot(corner, right)) / aspect, fabs(dot(corner, up)));
+        distance = fmax(distance, dot(corner, from) + across / slope);
+    }
+    return distance;
+}
+
 /* Everything in the picture, seen from in front and above. */
 static void suit_scene(GfxCameraDef *def, const SkiffSim *sim, const Frame *frame, double aspect) {
-    static const double from[3] = {0.35, 0.42, 0.84}; /* length 1.0 */
+    static const double from[3] = {0.35, 0.42, 0.8375}; /* of length 1 */
+    static const double air = 1.12;
     Bounds bounds = bounds_of_scene(sim, frame);
-    double radius = 0;
+    double half[3];
     for (int k = 0; k < 3; k++) {
-        double half = fmax(0.5 * (bounds.max[k] - bounds.min[k]), 0.0);
-        def->target[k] = frame->origin[k] + (isfinite(half) ? bounds.min[k] + half : 0);
-        radius += isfinite(half) ? half * half : 1;
+        half[k] = 0.5 * (bounds.max[k] - bounds.min[k]);
+        def->target[k] = frame->origin[k] + (isfinite(half[k]) ? bounds.min[k] + half[k] : 0);
+        half[k] = isfinite(half[k]) ? fmax(half[k], (double)frame->spacing) : 1;
     }
-    radius = sqrt(radius);
-    double half_fov = 0.5 * def->fov_deg * 3.14159265358979323846 / 180;
-    if (aspect < 1)
-        half_fov = atan(tan(half_fov) * aspect);
-    double distance = 0.92 * radius / sin(half_fov); /* corners of a box rarely reach its sphere */
+    const double above[3] = {0, 1, 1e-9}; /* x to the right in the picture, as far as there is a choice */
+    bool is_top = def->kind == GFX_CAMERA_TOP;
+    double distance = air * fitting_distance(half, is_top ? above : from, def->fov_deg, aspect);
     for (int k = 0; k < 3; k++)
         def->eye[k] = def->target[k] + distance * from[k];
-    def->distance = distance;
+    memcpy(def->forward, (const double[3]){is_top ? 0 : 1, 0, is_top ? -1 : 0}, sizeof def->forward);
+    def->distance = is_top ? distance : distance * hypot(from[0], from[2]);
     def->height = distance * from[1];
     def->look_up = 0;
 }
@@ -214,12 +233,13 @@ static bool add_camera(View *view, const SceneCamera *camera, int index, const S
                   : def.kind == GFX_CAMERA_BOW || view->frame.has_window ? view->hero
                                                                          : -1;
     keep(&def.fov_deg, camera->fov);
-    if (subject >= 0)
+    if (subject >= 0) {
         suit_body(&def, sim, subject);
-    else
+        bow_of(scene, subject, def.forward);
+    } else {
         suit_scene(&def, sim, &view->frame, (double)view->options.render.width / view->options.render.height);
+    }
     def.follows = subject >= 0 && !(stands && !isnan(camera->target[0]));
-    bow_of(scene, subject, def.forward);
     keep3(def.forward, camera->forward);
     keep3(def.eye, camera->eye);
     keep3(def.target, camera->target);
@@ -281,6 +301,8 @@ static bool make_cameras(View *view, const SkiffSim *sim, Err *err) {
                                                  : "fixed";
     if (!view_check_camera(view, first, err)) {
         err_prefix(err, "%s", view->options.keeps_camera ? "--camera" : view->scene->file);
+        if (view->options.keeps_camera && err)
+            err->code = ERR_USAGE;
         return false;
     }
     view->camera = find_camera(view, first);
@@ -468,6 +490,7 @@ static void draw_figures(const View *view, const Frame *frame) {
         const double *v = frame->bodies[view->hero].velocity;
         values.speed = hypot(v[0], v[2]);
     }
+    values.has_legend = render->look == GFX_LOOK_PARTICLES;
     if (render->hud == RENDER_HUD_TIMING)
         values.step_ms = view->step_ms;
     gfx_hud_draw(view->hud, (GfxImage){view->rgb, render->width, render->height}, &values);

@@ -184,7 +184,8 @@ static void draw_dash(const Canvas *canvas, const GfxHudValues *values) {
     float width = (speed ? speed_width : 0) + (throttle ? throttle_width : 0) + (rudder ? rudder_width : 0);
     if (width == 0)
         return;
-    float x = margin, y = 720 - margin - dash_height;
+    float all = (float)canvas->image.width / canvas->unit;
+    float x = values->has_legend ? 0.5f * (all - width - padding) : margin, y = 720 - margin - dash_height;
     box(canvas, x, y, width + padding, dash_height, corner, plate_ink);
     x += padding;
     y += padding;

@@ -4,6 +4,8 @@
 
 #include "text.h"
 
+#include <stdbool.h>
+
 /* What is shown. A number that is NaN, a negative count and a NULL text are left out. */
 typedef struct GfxHudValues {
     double time;             /* s */
@@ -12,7 +14,8 @@ typedef struct GfxHudValues {
     const char *keys;        /* names of the pressed keys, separated by blanks; "": none is pressed */
     double particles;        /* number of */
     long moves;              /* of the window, so far */
-    double step_ms; /* wall time of a step: differs between runs, and with it the bytes of the picture */
+    bool has_legend; /* a legend takes the lower left corner: speed, throttle and rudder are centred */
+    double step_ms;  /* wall time of a step: differs between runs, and with it the bytes of the picture */
 } GfxHudValues;
 
 GfxHudValues gfx_hud_nothing(void);
