@@ -130,6 +130,7 @@ static void fill_ripples(Frame *frame) {
         layer[3] = 1.0f / ripple_layers[i].tile;
         turn[0] = (float)c;
         turn[1] = (float)s;
+        turn[2] = log2f(layer[3]);
     }
 }
 
@@ -239,21 +240,23 @@ static double now_ms(void) {
     return 1e3 * (double)now.tv_sec + 1e-6 * (double)now.tv_nsec;
 }
 
-bool frame_draw(Frame *frame, Pass *passes, double *pass_ms, Err *err) {
+bool frame_draw(Frame *frame, Pass *passes, GfxStats *stats, Err *err) {
     fill_block(frame);
     for (int i = 0; i < COUNT; i++) {
         const PassType *type = passes_in_order[i];
-        pass_ms[i] = 0.0;
+        stats->pass_ms[i] = 0.0;
+        stats->pass_ran[i] = false;
         if (!is_used(frame, i) || frame->def.skip_passes & 1u << i)
             continue;
         double start = now_ms();
+        stats->pass_ran[i] = true;
         if (!type->draw(&passes[i], frame, err)) {
             err_prefix(err, "pass %s", type->name);
             return false;
         }
         if (frame->def.profile) {
             frame->gl->Finish();
-            pass_ms[i] = now_ms() - start;
+            stats->pass_ms[i] = now_ms() - start;
         }
     }
     return gl_check(frame->gl, "drawing", err);

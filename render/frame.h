@@ -14,7 +14,7 @@ const PassType *frame_pass_type(int index);
 bool frame_create(Frame *frame, Pass *passes, Err *err);
 void frame_destroy(Frame *frame, Pass *passes);
 
-/* Draws; frame->scene and frame->rgb are set by the caller. pass_ms: by pass, measured when def.profile. */
-bool frame_draw(Frame *frame, Pass *passes, double *pass_ms, Err *err);
+/* Draws; frame->scene and frame->rgb are set by the caller. Fills the passes' rows of stats. */
+bool frame_draw(Frame *frame, Pass *passes, GfxStats *stats, Err *err);
 
 #endif

@@ -254,7 +254,7 @@ bool gfx_draw(Gfx *gfx, const GfxScene *scene, uint8_t *rgb, Err *err) {
     Frame *frame = &gfx->frame;
     frame->scene = scene;
     frame->rgb = rgb;
-    bool ok = frame_draw(frame, gfx->passes, gfx->stats.pass_ms, err);
+    bool ok = frame_draw(frame, gfx->passes, &gfx->stats, err);
     frame->scene = NULL;
     frame->rgb = NULL;
     clock_gettime(CLOCK_MONOTONIC, &end);

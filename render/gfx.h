@@ -195,8 +195,9 @@ int gfx_pass_count(void);
 const char *gfx_pass_name(int pass); /* "depth", "composite", ... */
 
 typedef struct GfxStats {
-    uint32_t particles_drawn, droplets; /* of the last image */
-    double pass_ms[32]; /* of the last image, by pass; 0 where it did not run; needs GfxDef.profile */
+    uint32_t particles_drawn, droplets; /* of the last image, like all */
+    bool pass_ran[32];
+    double pass_ms[32]; /* needs GfxDef.profile, else 0 */
     double total_ms;
 } GfxStats;
 GfxStats gfx_stats(const Gfx *gfx);

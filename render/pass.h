@@ -25,7 +25,7 @@ typedef struct FrameBlock {
     float edge[4];        /* blend from, to, m; 1: there is an ocean; 1: there is a ground */
     float ground[4];      /* level; world offset of tiles in x, z; strength of ripples */
     float ripple[RIPPLE_LAYERS][4];      /* offset in tiles (2), slope, tiles a metre */
-    float ripple_turn[RIPPLE_LAYERS][4]; /* cosine, sine of a layer's direction */
+    float ripple_turn[RIPPLE_LAYERS][4]; /* cosine, sine of its direction; log2 of tiles a metre */
     float field[4];                      /* minimum, 1 / (maximum - minimum) */
 } FrameBlock;
 

@@ -29,9 +29,13 @@ enum {
     MEMORY_CELL_OF
 };
 
-#define OPEN_PART    0.35f  /* a cell with less than this part of a full one is open */
-#define DROPLET_SHOW 0.012f /* s of path shown by a droplet's stretch */
-#define WATER_PART   0.8f   /* mass of a particle / (rho0 d^3) */
+/* A cell with less than this part of a full one is open. Spheres of half a spacing leave gaps, behind which a
+ * third layer must stand; those of the water overlap. */
+#define OPEN_PART_WATER   0.25f
+#define OPEN_PART_SPHERES 0.60f
+#define SOLID_FADE        0.5f   /* what fades more than this hides nothing */
+#define DROPLET_SHOW      0.012f /* s of path shown by a droplet's stretch */
+#define WATER_PART        0.8f   /* mass of a particle / (rho0 d^3) */
 
 typedef struct Cells {
     int size[3]; /* with a margin of one empty cell on every side */
@@ -61,7 +65,8 @@ static bool find_bounds(const GfxParticles *particles, float min[3], float max[3
     return true;
 }
 
-static bool make_cells(Cells *cells, Surface *surface, const GfxParticles *particles, Err *err) {
+static bool make_cells(Cells *cells, Surface *surface, const GfxParticles *particles, float open_part,
+                       Err *err) {
     float min[3], max[3], edge = 2.0f * particles->spacing;
     if (!find_bounds(particles, min, max, err))
         return false;
@@ -79,7 +84,7 @@ static bool make_cells(Cells *cells, Surface *surface, const GfxParticles *parti
     }
     cells->inv_edge = 1.0f / edge;
     float ratio = edge / particles->spacing;
-    float open = ceilf(OPEN_PART * ratio * ratio * ratio / WATER_PART);
+    float open = ceilf(open_part * ratio * ratio * ratio / WATER_PART);
     cells->open_below = open > 60000.0f ? 60000 : (int)open;
     size_t count = (size_t)cells->size[0] * (size_t)cells->size[1] * (size_t)cells->size[2];
     size_t columns = (size_t)cells->size[0] * (size_t)cells->size[2];
@@ -102,7 +107,7 @@ static int cell_coordinate(const Cells *cells, float x, int k) {
 }
 
 /* y runs fastest, so that columns are contiguous. */
-static void count_particles(Cells *cells, const GfxParticles *particles, float solid_fade) {
+static void count_particles(Cells *cells, const GfxParticles *particles) {
     for (uint32_t i = 0; i < particles->count; i++) {
         const float *p = particles->position[i];
         int x = cell_coordinate(cells, p[0], 0), y = cell_coordinate(cells, p[1], 1);
@@ -110,7 +115,7 @@ static void count_particles(Cells *cells, const GfxParticles *particles, float s
         int cell = column * cells->size[1] + y;
         cells->cell_of[i] = cell;
         cells->column[column] = 1;
-        if (fade_of(particles, i) >= solid_fade && cells->count[cell] < UINT16_MAX)
+        if (fade_of(particles, i) >= SOLID_FADE && cells->count[cell] < UINT16_MAX)
             cells->count[cell]++;
     }
 }
@@ -246,10 +251,9 @@ bool surface_select(Surface *surface, const GfxScene *scene, GfxLook look, Err *
         return false;
     if (particles->count == 0)
         return true;
-    if (!make_cells(&cells, surface, particles, err))
+    if (!make_cells(&cells, surface, particles, water ? OPEN_PART_WATER : OPEN_PART_SPHERES, err))
         return false;
-    /* What one can look through hides nothing: among spheres only the opaque ones fill a cell. */
-    count_particles(&cells, particles, water ? 0.5f : 1.0f);
+    count_particles(&cells, particles);
     int eye[3];
     for (int k = 0; k < 3; k++) {
         float cell = (scene->camera.eye[k] - cells.origin[k]) * cells.inv_edge;
@@ -259,16 +263,14 @@ bool surface_select(Surface *surface, const GfxScene *scene, GfxLook look, Err *
     for (uint32_t i = 0; i < particles->count; i++) {
         float fade = fade_of(particles, i);
         int cell = cells.cell_of[i];
-        if (!(fade > 0.0f))
+        if (!(fade > 0.0f) || !is_outer(&cells, cell, eye, water && scene->ocean.enabled))
             continue;
-        if (!water && fade < 1.0f)
-            surface->fading.points[surface->fading.count++] = make_point(particles, values, i, fade);
-        else if (is_outer(&cells, cell, eye, water && scene->ocean.enabled)) {
-            if (water && is_alone(&cells, cell))
-                cells.cell_of[i] = -1;
-            else
-                surface->body.points[surface->body.count++] = make_point(particles, values, i, fade);
+        if (water && is_alone(&cells, cell)) {
+            cells.cell_of[i] = -1;
+            continue;
         }
+        SurfaceList *list = !water && fade < 1.0f ? &surface->fading : &surface->body;
+        list->points[list->count++] = make_point(particles, values, i, fade);
     }
     if (water)
         return fill_droplets(surface, &cells, particles, err);

@@ -3,18 +3,28 @@
 
 #include <stddef.h>
 
+static void create_points(const Gl *gl, PointBuffer *points) {
+    gl->GenVertexArrays(1, &points->vertex_array);
+    gl->GenBuffers(1, &points->buffer);
+    gl->BindVertexArray(points->vertex_array);
+    gl->BindBuffer(GL_ARRAY_BUFFER, points->buffer);
+    gl->EnableVertexAttribArray(0);
+    gl->EnableVertexAttribArray(1);
+    gl->VertexAttribPointer(0, 4, GL_FLOAT, GL_FALSE, sizeof(SurfacePoint), NULL);
+    gl->VertexAttribPointer(1, 1, GL_FLOAT, GL_FALSE, sizeof(SurfacePoint),
+                            (void *)offsetof(SurfacePoint, value));
+}
+
+static bool create(Pass *pass, Frame *frame, Err *err) {
+    (void)pass;
+    (void)err;
+    create_points(frame->gl, &frame->body);
+    create_points(frame->gl, &frame->droplets);
+    create_points(frame->gl, &frame->fading);
+    return true;
+}
+
 static void upload(const Gl *gl, PointBuffer *points, const SurfaceList *list) {
-    if (!points->vertex_array) {
-        gl->GenVertexArrays(1, &points->vertex_array);
-        gl->GenBuffers(1, &points->buffer);
-        gl->BindVertexArray(points->vertex_array);
-        gl->BindBuffer(GL_ARRAY_BUFFER, points->buffer);
-        gl->EnableVertexAttribArray(0);
-        gl->EnableVertexAttribArray(1);
-        gl->VertexAttribPointer(0, 4, GL_FLOAT, GL_FALSE, sizeof(SurfacePoint), NULL);
-        gl->VertexAttribPointer(1, 1, GL_FLOAT, GL_FALSE, sizeof(SurfacePoint),
-                                (void *)offsetof(SurfacePoint, value));
-    }
     points->count = (GLsizei)list->count;
     gl->BindBuffer(GL_ARRAY_BUFFER, points->buffer);
     gl->BufferData(GL_ARRAY_BUFFER, (GLsizeiptr)((size_t)list->count * sizeof(SurfacePoint)), list->points,
@@ -32,4 +42,4 @@ static bool draw(Pass *pass, Frame *frame, Err *err) {
     return true;
 }
 
-const PassType surface_pass = {"surface", PASS_IN_WATER | PASS_IN_PARTICLES, -1, NULL, draw};
+const PassType surface_pass = {"surface", PASS_IN_WATER | PASS_IN_PARTICLES, -1, create, draw};

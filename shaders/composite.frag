@@ -18,42 +18,35 @@ struct Water {
 
 // How much the particles count at local x, z.
 float fluid_part(vec2 p) {
-    if (edge.z == 0.0)
-        return 1.0;
     vec2 t = edge_box.xy + p * edge_box.zw;
-    if (any(greaterThan(abs(t - 0.5), vec2(0.5))))
-        return 0.0;
-    return smoothstep(edge.x, edge.y, textureLod(edge_image, t, 0.0).r);
+    float part = smoothstep(edge.x, edge.y, textureLod(edge_image, t, 0.0).r);
+    vec2 off = abs(t - 0.5);
+    part = max(off.x, off.y) > 0.5 ? 0.0 : part;
+    return edge.z > 0.0 ? part : 1.0;
 }
 
-Water find_water(vec3 ray, bool mesh_there) {
-    Water water = Water(NEVER, eye.xyz, vec3(0.0, 1.0, 0.0), 0.0);
+// Without branches: software GL computes both sides of them anyway, and then merges.
+Water find_water(vec3 ray, float mesh_there) {
     float still = (eye.w - eye.y) / (abs(ray.y) > 1e-5 ? ray.y : 1e-5);
     bool ocean = edge.z > 0.0 && still > 0.0;
     vec4 fluid = textureLod(normal_image, uv, 0.0);
-    if (fluid.w > 0.5) {
-        fluid /= fluid.w;
-        float depth = fluid.z + plane_depth(ray);
-        float part = fluid_part((eye.xyz + ray * depth).xz);
-        if (part > 0.0) {
-            vec3 n = vec3(fluid.xy, sqrt(max(0.003, 1.0 - dot(fluid.xy, fluid.xy))));
-            water.depth = ocean ? mix(min(still, depth + 5.0), depth, part) : depth;
-            water.normal = normalize(mix(vec3(0.0, 1.0, 0.0), mat3(camera) * n, part));
-            water.fluid = part;
-            water.place = eye.xyz + ray * water.depth;
-            return water;
-        }
-    }
-    // No particle: the ocean. Inside the window a hole is the inside of a boat.
-    if (ocean && !(mesh_there && fluid_part((eye.xyz + ray * still).xz) > 0.5)) {
-        water.depth = still;
-        water.place = eye.xyz + ray * still;
-    }
-    return water;
+    bool covered = fluid.w > 0.5;
+    fluid /= max(fluid.w, 1e-3);
+    // Where no particle is, the ocean; but a hole inside the window is the inside of a boat.
+    float depth = covered ? fluid.z + plane_depth(ray) : still;
+    float part = fluid_part((eye.xyz + ray * depth).xz);
+    bool hole = !covered && part * mesh_there > 0.5;
+    part = covered ? part : 0.0;
+    vec3 n = vec3(fluid.xy, sqrt(max(0.003, 1.0 - dot(fluid.xy, fluid.xy))));
+    n = mix(vec3(0.0, 1.0, 0.0), mat3(camera) * n, part);
+    float at = ocean ? mix(min(still, depth + 5.0), depth, part) : part > 0.0 ? depth : NEVER;
+    at = hole ? NEVER : at;
+    return Water(at, eye.xyz + ray * min(at, 1e5), normalize(n), part);
 }
 
-vec3 backdrop(vec3 ray) {
-    vec3 direction = normalize(ray), c = sky(direction);
+// Sky, and the ground where there is one.
+vec3 backdrop(vec3 ray, vec3 direction, vec3 air) {
+    vec3 c = sky(direction);
     if (edge.w > 0.0 && ray.y < -1e-4) {
         float depth = (ground.x - eye.y) / ray.y;
         if (depth > 0.0) {
@@ -62,14 +55,14 @@ vec3 backdrop(vec3 ray) {
             vec2 d = abs(fract(p + 0.5) - 0.5);
             vec2 on = (1.0 - smoothstep(vec2(0.006), vec2(0.006 + pixel), d)) * clamp(1.2 - pixel * 3.0, 0.0, 1.0);
             vec3 floor_color = vec3(0.66, 0.68, 0.69) - 0.10 * max(on.x, on.y);
-            c = mix(floor_color, haze(direction), 1.0 - exp(-0.035 * far));
+            c = mix(floor_color, air, 1.0 - exp(-0.035 * far));
         }
     }
     return c;
 }
 
 // What lies behind the surface, seen through the ripples: colour, and metres of water in between.
-vec4 see_through(Water water, vec3 ray, vec2 bend, float thickness, vec3 deep) {
+vec4 see_through(Water water, float ray_length, vec2 bend, float thickness, vec3 empty) {
     float own_depth = texelFetch(mesh_depth_image, ivec2(gl_FragCoord.xy), 0).r;
     vec2 at = uv + bend * 0.035;
     float buffer = textureLod(mesh_depth_image, at, 0.0).r;
@@ -78,29 +71,36 @@ vec4 see_through(Water water, vec3 ray, vec2 bend, float thickness, vec3 deep) {
         buffer = own_depth;
     }
     bool mesh_behind = buffer < 1.0;
-    float under = mesh_behind ? max(mesh_depth(buffer) - water.depth, 0.0) * length(ray) : edge.z > 0.0 ? 8.0 : 3.0;
+    float under = mesh_behind ? max(mesh_depth(buffer) - water.depth, 0.0) * ray_length : edge.z > 0.0 ? 8.0 : 3.0;
     // In the air only what is thick is a body of water; the rest are sheets.
     if (edge.z == 0.0 || water.place.y > eye.w + 0.25)
         under = mix(min(under, thickness), under, smoothstep(0.18, 0.40, thickness));
-    vec3 behind = mesh_behind ? textureLod(mesh_image, at, 0.0).rgb
-                              : edge.z > 0.0 && ray.y < 0.0 ? deep : backdrop(ray + mat3(camera) * vec3(bend * 0.1, 0.0));
-    return vec4(behind, under);
+    return vec4(mesh_behind ? textureLod(mesh_image, at, 0.0).rgb : empty, under);
 }
 
 // White water: cells of foam that close up as there is more of it.
-float foam_cover(vec2 p, vec2 slopes, float amount, float footprint) {
-    vec2 q = p + ground.yz;
-    float coarse = ripple_layer(2, p + slopes * 0.08, footprint).z, fine = ripple_layer(3, p, footprint).w;
+float foam_cover(vec2 p, vec2 slopes, float amount, float level) {
+    float coarse = ripple_layer(2, p + slopes * 0.08, level).z, fine = ripple_layer(3, p, level).w;
     float pattern = 0.58 * coarse + 0.42 * fine;
     float dense = 1.0 - exp(-1.1 * amount);
     return clamp(smoothstep(0.85 - dense, 2.0 - 1.2 * dense, pattern + 0.25 * dense) * min(1.0, 4.0 * dense), 0.0, 0.95);
 }
 
-vec3 shade(Water water, vec3 ray) {
-    vec3 direction = normalize(ray), n = water.normal;
-    float far = water.depth * length(ray);
+float power_of_64(float x) {
+    x *= x;
+    x *= x;
+    x *= x;
+    x *= x;
+    x *= x;
+    return x * x;
+}
+
+vec3 shade(Water water, vec3 direction, float ray_length, vec3 background, vec3 air) {
+    vec3 n = water.normal;
+    float far = water.depth * ray_length;
     float footprint = far * 2.0 * lens.y * size.w * inversesqrt(max(abs(direction.y), 0.03));
-    vec2 slopes = ripple_slopes(water.place.xz, footprint) * smoothstep(0.2, 0.75, n.y);
+    float level = ripple_level(footprint);
+    vec2 slopes = ripple_slopes(water.place.xz, level) * smoothstep(0.2, 0.75, n.y);
     n = normalize(n - vec3(slopes.x, 0.0, slopes.y) * (1.0 - 0.3 * water.fluid));
     float facing = dot(n, direction);
     if (facing > -0.03) { // turned away: as steep as can be seen
@@ -115,7 +115,10 @@ vec3 shade(Water water, vec3 ray) {
     up = normalize(up);
     vec3 mirrored = sky(up);
     float towards_sun = max(dot(up, sun.xyz), 0.0);
-    float glint = 2.4 * pow(towards_sun, 1000.0) + 0.20 * pow(towards_sun, 90.0);
+    float broad = power_of_64(towards_sun), narrow = broad * broad;
+    narrow *= narrow; // 256
+    narrow *= narrow * narrow * narrow; // 1024
+    float glint = 2.4 * narrow + 0.20 * broad;
     vec2 bend = (mat3(view) * (n - vec3(0.0, 1.0, 0.0))).xy;
     vec4 mesh_mirrored = textureLod(reflection_image, uv + bend * vec2(0.16, 0.20) / max(1.0, 0.5 * far), 0.0);
     mirrored = mix(mirrored, mesh_mirrored.rgb, mesh_mirrored.a);
@@ -123,7 +126,9 @@ vec3 shade(Water water, vec3 ray) {
 
     vec2 sums = textureLod(thickness_image, uv, 0.0).rg;
     bool ocean = edge.z > 0.0;
-    vec3 deep = ocean ? vec3(0.008, 0.125, 0.185) : vec3(0.02, 0.30, 0.38);
+    vec3 deep = ocean ? vec3(0.010, 0.135, 0.200) : vec3(0.02, 0.30, 0.38);
+    // Faces turned to the sun let more light in.
+    deep *= 1.0 + 1.3 * dot(n.xz, sun.xz);
     vec3 absorption = ocean ? vec3(3.2, 1.05, 0.75) : vec3(1.5, 0.38, 0.22);
     // Light through thin crests and steep faces.
     float crest = clamp((water.place.y - eye.w) * 4.0 + 0.10, 0.0, 1.0) * water.fluid;
@@ -132,13 +137,13 @@ vec3 shade(Water water, vec3 ray) {
     deep += vec3(0.0, 0.020, 0.024) * min((1.0 - n.y) * 5.0, 1.5);
     float foam = sums.g * water.fluid;
     deep += vec3(0.03, 0.16, 0.16) * (1.0 - exp(-0.6 * foam)); // bubbles below
-    vec4 behind = see_through(water, ray, bend, mix(4.0, sums.r, water.fluid), deep);
+    vec4 behind = see_through(water, ray_length, bend, mix(4.0, sums.r, water.fluid),
+                              ocean && direction.y < 0.0 ? deep : background);
     vec3 clear = exp(-absorption * behind.a);
     vec3 c = mix(behind.rgb * clear + deep * (1.0 - clear), mirrored, mirror) + vec3(1.0, 0.88, 0.68) * glint;
     float light = 0.78 + 0.26 * max(dot(n, sun.xyz), 0.0);
-    if (foam > 0.01)
-        c = mix(c, vec3(0.93, 0.97, 1.0) * light, foam_cover(water.place.xz, slopes, foam, footprint));
-    return ocean ? mix(c, haze(direction), 1.0 - exp(-0.0035 * max(far - 6.0, 0.0))) : c;
+    c = mix(c, vec3(0.93, 0.97, 1.0) * light, foam_cover(water.place.xz, slopes, foam, level));
+    return ocean ? mix(c, air, 1.0 - exp(-0.0035 * max(far - 6.0, 0.0))) : c;
 }
 
 // Leaves all but the brightest as it is.
@@ -151,11 +156,11 @@ void main() {
     vec3 ray = local_ray(uv);
     vec4 mesh = texelFetch(mesh_image, ivec2(gl_FragCoord.xy), 0);
     float solid = mesh_depth(texelFetch(mesh_depth_image, ivec2(gl_FragCoord.xy), 0).r);
-    Water water = find_water(ray, mesh.a > 0.5);
-    vec3 c;
-    if (water.depth < solid || (water.depth < NEVER && mesh.a < 0.5))
-        c = shade(water, ray);
-    else
-        c = mesh.a > 0.5 ? mesh.rgb : backdrop(ray);
+    Water water = find_water(ray, mesh.a);
+    float ray_length = length(ray);
+    vec3 direction = ray / ray_length, air = haze(direction), background = backdrop(ray, direction, air);
+    vec3 c = mesh.a > 0.5 ? mesh.rgb : background;
+    vec3 shaded = shade(water, direction, ray_length, background, air);
+    c = water.depth < solid || (water.depth < NEVER && mesh.a < 0.5) ? shaded : c;
     color = vec4(display(c), 1.0);
 }

@@ -40,7 +40,9 @@ vec4 hull_paint() {
     vec3 base = paint.rgb;
     float gloss = 0.35;
     bool flat_face = own_normal.y > 0.75;
-    if (heights.z > heights.y && own.y > heights.y && !(flat_face && own.y < heights.y + 0.02)) {
+    bool roof = own.y > mix(heights.y, heights.z, 0.8);
+    bool flared = own_normal.y < -0.02; // hulls flare at the bow, cabins do not
+    if (heights.z > heights.y && own.y > heights.y && (roof || !(flat_face || flared))) {
         float part = (own.y - heights.y) / (heights.z - heights.y);
         base = vec3(0.80, 0.16, 0.10);
         if (part > 0.42 && part < 0.82 && own_normal.y < 0.6) {
@@ -90,7 +92,7 @@ void main() {
     vec3 to_eye = normalize(eye.xyz - place);
     float lit = max(dot(n, sun.xyz), 0.0);
     vec3 ambient = mix(vec3(0.24, 0.34, 0.40), vec3(0.56, 0.66, 0.78), n.y * 0.5 + 0.5);
-    vec3 c = surface.rgb * (ambient * 0.92 + vec3(1.0, 0.93, 0.82) * lit * 0.95);
+    vec3 c = surface.rgb * (ambient * 1.04 + vec3(1.0, 0.93, 0.82) * lit * 0.95);
     float facing = 1.0 - max(dot(n, to_eye), 0.0), f = facing * facing;
     c += surface.w * sky(reflect(-to_eye, n)) * (0.05 + 0.65 * f * f * facing);
     c += surface.w * vec3(1.0, 0.92, 0.8) * pow(max(dot(n, normalize(to_eye + sun.xyz)), 0.0), 90.0) * lit;

@@ -118,15 +118,16 @@ static inline void sea_fill(Sea *sea, const SeaDef *def) {
                 sea->fade[i] = sea_smooth((R - r) / 0.3f);
                 sea_add(sea, px, py, pz, foam, 3.0f * foam * (1.0f - 0.6f * (h - py)));
             }
-    /* Thrown up at both sides of the bow. */
-    for (int k = 0; k < 900; k++) {
+    /* Thrown up at both sides of the bow: a sheet near the hull, drops farther away. */
+    for (int k = 0; k < 420; k++) {
         float t = sea_random(&state), side = sea_random(&state) < 0.5f ? -1.0f : 1.0f,
               up = sea_random(&state);
-        float x = (0.66f - 0.55f * t) * scale,
-              z = side * (0.10f + 0.34f * t + 0.10f * (sea_random(&state) - 0.5f)) * scale;
-        float y = sea_height(def, x, z) + scale * (0.02f + 0.13f * up * (1.0f - t));
+        float far = k % 3 == 0 ? 1.0f + 2.0f * sea_random(&state) : 1.0f;
+        float x = (0.70f - 0.60f * t) * scale, spread = 0.12f * (sea_random(&state) - 0.3f);
+        float z = side * (0.08f + 0.30f * t + spread) * far * scale;
+        float y = sea_height(def, x, z) + scale * (0.01f + 0.16f * up * far * (1.0f - t));
         sea->fade[sea->scene.particles.count] = 1.0f;
-        sea_add(sea, x, y, z, 1.2f, 2.5f);
+        sea_add(sea, x, y, z, 1.0f, 2.5f);
     }
 }
 
