@@ -16,11 +16,11 @@ typedef struct CliPictures {
 
 /* What the command line said. Options that a command does not have keep their defaults. */
 typedef struct CliArgs {
-    const char *scene;                /* or the folder of `render`; NULL where it may be left out and was */
-    const char *output;               /* -o; NULL: not given */
-    double duration;                  /* s; NaN: the scene's */
-    int threads;                      /* 0: one for each core */
-    int simd;                         /* SkiffSimd */
+    const char *scene;  /* what a command is about, mostly a scene; NULL: left out where it may be */
+    const char *output; /* -o; NULL: not given */
+    double duration;    /* s; NaN: the scene's */
+    int threads;        /* 0: one for each core */
+    int simd;           /* SkiffSimd */
     const char *edits[CLI_MAX_EDITS]; /* --set, in order */
     int edit_count;
     bool force, resume, quiet;
@@ -31,6 +31,9 @@ typedef struct CliArgs {
     bool json, no_results;
     const char *results; /* NULL: the source tree's */
     CliPictures pictures;
+    double edge; /* rest make, d */
+    int seed;
+    double min[3], max[3]; /* rest cut, m; NaN: not given */
     bool help;
 } CliArgs;
 

@@ -298,11 +298,15 @@ bool boundary_reserve(Boundary *boundary, uint32_t particle_capacity, int body_c
     return true;
 }
 
-bool boundary_place(Boundary *boundary, const Body *bodies, int body_count, const double origin[3],
-                    float cell_size, int threads, Err *err) {
+void boundary_place_centres(Boundary *boundary, const Body *bodies, int body_count, const double origin[3]) {
     for (int b = 0; b < body_count; b++)
         for (int k = 0; k < 3; k++)
             boundary->centres[1 + b][k] = (float)(bodies[b].position[k] - origin[k]);
+}
+
+bool boundary_place(Boundary *boundary, const Body *bodies, int body_count, const double origin[3],
+                    float cell_size, int threads, Err *err) {
+    boundary_place_centres(boundary, bodies, body_count, origin);
     BoundarySet *set = &boundary->moving;
     if (set->samples.count == 0)
         return true;
@@ -355,11 +359,12 @@ static bool apply_blocks(Boundary *boundary, const BoundaryJob *job, const Passe
     return first_fault == UINT32_MAX;
 }
 
-bool boundary_apply(Boundary *boundary, Rows *rows, const Passes *passes, const Particles *particles,
-                    int threads, Err *err) {
+bool boundary_apply(Boundary *boundary, Rows *rows, const RowsJob *build, Err *err) {
+    const Particles *particles = build->particles;
     const BoundaryJob job = {.sets = {&boundary->fixed.sorted, &boundary->moving.sorted},
                              .position = (const Float4 *)particles->position,
                              .centres = (const Float4 *)boundary->centres,
+                             .frozen = build->frozen,
                              .count = particles->count,
                              .kernel = rows->pairs.kernel,
                              .gradient_unit = rows->pairs.gradient_unit,
@@ -367,7 +372,7 @@ bool boundary_apply(Boundary *boundary, Rows *rows, const Passes *passes, const 
                              .gradient_sum = rows->gradient_sum.data,
                              .neighbours = rows->neighbours};
     uint32_t fault;
-    if (!apply_blocks(boundary, &job, passes, rows, threads, &fault))
+    if (!apply_blocks(boundary, &job, build->passes, rows, build->threads, &fault))
         return err_set(err, ERR_DIVERGED, "particle %llu touches more than %d walls and bodies at once",
                        (unsigned long long)particles->id[fault], MAX_CONTACT_OBJECTS);
     if (boundary->contact_count <= boundary->contact_capacity)
@@ -380,7 +385,7 @@ bool boundary_apply(Boundary *boundary, Rows *rows, const Passes *passes, const 
     boundary->contacts = boundary->contact_buffer.data;
     BoundaryJob again = job;
     again.density = NULL;
-    return apply_blocks(boundary, &again, passes, rows, threads, &fault);
+    return apply_blocks(boundary, &again, build->passes, rows, build->threads, &fault);
 }
 
 void boundary_impulse(const Boundary *boundary, const float *p, uint32_t blocks, double (*totals)[6],

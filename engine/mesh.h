@@ -38,6 +38,12 @@ bool mesh_parse_obj(const char *name, const char *text, size_t size, Mesh *mesh,
 bool mesh_make_box(const float min[3], const float max[3], Mesh *mesh, Err *err);
 /* Icosphere of 20 * 4^level triangles with vertices on the sphere; level 0..8. */
 bool mesh_make_sphere(const float centre[3], float radius, int level, Mesh *mesh, Err *err);
+/* The solid between an outline at y = -height / 2 and another of as many points (x, z) at y = height / 2,
+ * joined point to point. Each outline runs from z to x (clockwise in the x-z plane) once around the y axis,
+ * which sees all of it, or is a point on that axis. Points: 3 or more; they lie on the surface. ERR_INPUT
+ * otherwise. */
+bool mesh_make_prism(const float (*bottom)[2], const float (*top)[2], uint32_t count, float height,
+                     Mesh *mesh, Err *err);
 /* Convex polyhedron: points p with (p - point_k) . normal_k <= 0 for all k planes (at most 1024; normals of
  * any length > 0). Details below 1e-6 of the extent of the points are not resolved. ERR_INPUT when empty or
  * unbounded. */
@@ -67,7 +73,11 @@ void mesh_free_tree(Mesh *mesh);
 /* Signed distance in m, negative inside, exact for closed meshes (angle-weighted pseudo-normals, [Baerentzen
  * & Aanaes 2005]). Needs the tree. closest may be NULL. */
 float mesh_distance(const Mesh *mesh, const float point[3], float closest[3]);
-/* Batch of the above, on all OpenMP threads; the same values. */
-void mesh_distances(const Mesh *mesh, const float (*points)[3], uint32_t count, float *distances);
+/* The same distance and its gradient: a unit vector, away from the closest point outside, towards it inside;
+ * on the surface the (pseudo-)normal there. */
+float mesh_distance_gradient(const Mesh *mesh, const float point[3], float gradient[3]);
+/* The same distances of many points (their fourth number is not used) on this many OpenMP threads. */
+void mesh_distances(const Mesh *mesh, const float (*points)[4], uint32_t count, float *distances,
+                    int threads);
 
 #endif

@@ -463,7 +463,7 @@ static double winding_number(const Mesh *mesh, const double p[3]) {
 static void check_distances(Mesh *mesh, uint32_t count) {
     Err err = {0};
     assert_true(mesh_build_tree(mesh, &err));
-    float(*points)[3] = malloc(count * sizeof *points), *batch = malloc(count * sizeof *batch);
+    float(*points)[4] = malloc(count * sizeof *points), *batch = malloc(count * sizeof *batch);
     assert_true(points && batch);
     uint64_t counter = 1;
     uint32_t steep = 0, inside = 0;
@@ -473,7 +473,7 @@ static void check_distances(Mesh *mesh, uint32_t count) {
             double size = (double)mesh->max[k] - (double)mesh->min[k];
             points[i][k] = (float)(centre + (i % 7 == 0 ? 10.0 : 0.9) * size * random_signed(&counter));
         }
-    mesh_distances(mesh, (const float(*)[3])points, count, batch);
+    mesh_distances(mesh, (const float(*)[4])points, count, batch, 2);
     for (uint32_t i = 0; i < count; i++) {
         double p[3] = {(double)points[i][0], (double)points[i][1], (double)points[i][2]};
         float closest[3], distance = mesh_distance(mesh, points[i], closest);
@@ -547,10 +547,10 @@ static void test_distance_ties(void **state) {
                 assert_true(fabs((double)mesh_distance(&mesh, p, NULL) - expected) < 1e-6);
             }
     /* Far away and not a number: an answer, and nothing for the points that follow in the batch. */
-    const float odd[4][3] = {
+    const float odd[4][4] = {
         {1e6f, 0.5f, 0.5f}, {NAN, 0.0f, 0.0f}, {INFINITY, 0.0f, 0.0f}, {0.5f, 0.5f, 0.25f}};
     float distances[4];
-    mesh_distances(&mesh, odd, 4, distances);
+    mesh_distances(&mesh, odd, 4, distances, 1);
     assert_true(distances[0] == 999999.0f);
     assert_true(distances[3] == -0.25f);
     mesh_free(&mesh);

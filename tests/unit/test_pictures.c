@@ -116,7 +116,7 @@ static void wrong_options_are_explained(void **unused) {
     expect("run " SMALL " -o a --size 33x32 --video", 2, "must be even, found 33x32");
     expect("render nothing", 3, "nothing: cannot open");
     expect("render", 2, "the folder of a run is missing");
-    expect("gl-info x", 2, "takes no argument");
+    expect("gl-info x", 2, "takes options only");
     assert_false(file_exists("a"));
 }
 
