@@ -92,7 +92,7 @@ void skiff_body_mesh(const SkiffSim *sim, int index, const float (**vertices)[3]
 
 void skiff_tank_mesh(const SkiffSim *sim, const float (**vertices)[3], uint32_t *vertex_count,
                      const uint32_t (**triangles)[3], uint32_t *triangle_count) {
-    look_at_mesh(&sim->tank, vertices, vertex_count, triangles, triangle_count);
+    look_at_mesh(&sim->tank.mesh, vertices, vertex_count, triangles, triangle_count);
 }
 
 uint64_t skiff_hash(const SkiffSim *sim) {
