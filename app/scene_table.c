@@ -138,6 +138,89 @@ static void check_rotation(const ScenePlacement *placement, Problems *problems) 
     }
 }
 
+/* ---- Cylinders, stars and cones, shared by tanks and bodies ---- */
+
+/* `variants` are those of a tank; members of bodies have 0. */
+#define RADIUS_ROW(struct_type, member, mask)                                                                \
+    {                                                                                                        \
+        ROW(FIELD_FLOAT, struct_type, member, "radius"), LENGTH,                                             \
+            .flags = FIELD_REQUIRED, .variants = mask,                                                       \
+            .help = "Of a sphere or cylinder, of a star's tips, of a cone's floor"                           \
+    }
+#define HEIGHT_ROW(struct_type, member, mask)                                                                \
+    {                                                                                                        \
+        ROW(FIELD_FLOAT, struct_type, member, "height"), LENGTH,                                             \
+            .flags = FIELD_REQUIRED, .variants = mask, .help = "Along y; half of it below its own origin"    \
+    }
+#define TOP_RADIUS_ROW(struct_type, member, mask)                                                            \
+    {                                                                                                        \
+        ROW(FIELD_FLOAT, struct_type, member, "topRadius"),                                                  \
+            .min = 0, .max = 1e5, .unit = "m", .flags = FIELD_REQUIRED, .variants = mask,                    \
+            .help = "Of the cone's top, narrower or wider than its floor; 0: a tip"                          \
+    }
+#define INNER_RADIUS_ROW(struct_type, member, mask)                                                          \
+    {                                                                                                        \
+        ROW(FIELD_FLOAT, struct_type, member, "innerRadius"), LENGTH,                                        \
+            .flags = FIELD_REQUIRED, .variants = mask,                                                       \
+            .help = "Of the corners between a star's tips; at most radius"                                   \
+    }
+#define BRANCHES_ROW(struct_type, member, mask)                                                              \
+    {                                                                                                        \
+        ROW(FIELD_INT, struct_type, member, "branches"),                                                     \
+            .min = 2, .max = SKIFF_MAX_BRANCHES, .variants = mask,                                           \
+            .help = "Tips of the star; the first one points towards +z"                                      \
+    }
+
+static SceneRound default_round(void) {
+    SkiffGeometryDef geometry = skiff_geometry_default();
+    return (SceneRound){.branches = geometry.branches};
+}
+
+static void init_round(void *object) {
+    *(SceneRound *)object = default_round();
+}
+
+static void check_star(const SceneRound *star, Problems *problems) {
+    if (star->inner_radius > star->radius) {
+        size_t mark = problems_enter(problems, "innerRadius");
+        problems_add(problems, "%g is above radius, which is %g", (double)star->inner_radius,
+                     (double)star->radius);
+        problems_leave(problems, mark);
+    }
+}
+
+static void check_body_star(void *object, Problems *problems) {
+    check_star(object, problems);
+}
+
+static const Field cylinder_fields[] = {RADIUS_ROW(SceneRound, radius, 0), HEIGHT_ROW(SceneRound, height, 0)};
+static const Field star_fields[] = {BRANCHES_ROW(SceneRound, branches, 0), RADIUS_ROW(SceneRound, radius, 0),
+                                    INNER_RADIUS_ROW(SceneRound, inner_radius, 0),
+                                    HEIGHT_ROW(SceneRound, height, 0)};
+static const Field cone_fields[] = {RADIUS_ROW(SceneRound, radius, 0),
+                                    TOP_RADIUS_ROW(SceneRound, top_radius, 0),
+                                    HEIGHT_ROW(SceneRound, height, 0)};
+
+static const FieldRule star_rules[] = {{"radius|innerRadius", check_body_star}};
+
+static const ObjectType cylinder_type = {.help = "An upright cylinder",
+                                         .fields = cylinder_fields,
+                                         .field_count = COUNT(cylinder_fields),
+                                         .size = sizeof(SceneRound),
+                                         .init = init_round};
+static const ObjectType star_type = {.help = "An upright prism over a star with straight edges",
+                                     .fields = star_fields,
+                                     .field_count = COUNT(star_fields),
+                                     .size = sizeof(SceneRound),
+                                     .init = init_round,
+                                     .rules = star_rules,
+                                     .rule_count = COUNT(star_rules)};
+static const ObjectType cone_type = {.help = "An upright cone or truncated cone",
+                                     .fields = cone_fields,
+                                     .field_count = COUNT(cone_fields),
+                                     .size = sizeof(SceneRound),
+                                     .init = init_round};
+
 /* ---- Tank ---- */
 
 static void init_plane(void *object) {
@@ -170,12 +253,23 @@ static const ObjectType plane_type = {.help = "A flat wall",
                                       .rules = plane_rules,
                                       .rule_count = COUNT(plane_rules)};
 
-enum { BOX = 1 << SCENE_TANK_BOX, MESH = 1 << SCENE_TANK_MESH, PLANES = 1 << SCENE_TANK_PLANES };
+enum {
+    BOX = 1 << SCENE_TANK_BOX,
+    MESH = 1 << SCENE_TANK_MESH,
+    PLANES = 1 << SCENE_TANK_PLANES,
+    SPHERE = 1 << SCENE_TANK_SPHERE,
+    CYLINDER = 1 << SCENE_TANK_CYLINDER,
+    STAR = 1 << SCENE_TANK_STAR,
+    CONE = 1 << SCENE_TANK_CONE,
+    UPRIGHT = CYLINDER | STAR | CONE
+};
 
 static void init_tank(void *object) {
     SkiffTankDef tank = skiff_def_default().tank;
-    *(SceneTank *)object =
-        (SceneTank){.open = tank.open, .placement = default_placement(), .wet_height = tank.wet_height};
+    *(SceneTank *)object = (SceneTank){.open = tank.open,
+                                       .round = default_round(),
+                                       .placement = default_placement(),
+                                       .wet_height = tank.wet_height};
 }
 
 static void check_tank_box(void *object, Problems *problems) {
@@ -189,6 +283,24 @@ static void check_tank_rotation(void *object, Problems *problems) {
     check_rotation(&tank->placement, problems);
 }
 
+static void check_tank_star(void *object, Problems *problems) {
+    const SceneTank *tank = object;
+    if (tank->type == SCENE_TANK_STAR)
+        check_star(&tank->round, problems);
+}
+
+/* The lid is what lies at the very top: that of a tilted tank does not. */
+static void check_tank_open(void *object, Problems *problems) {
+    const SceneTank *tank = object;
+    const float *axis = tank->placement.rotation_axis;
+    const bool tilted = tank->placement.rotation_angle != 0 && (axis[0] != 0 || axis[2] != 0);
+    if (tank->open && tilted && (UPRIGHT >> tank->type & 1)) {
+        size_t mark = problems_enter(problems, "open");
+        problems_add(problems, "a tilted tank keeps its lid, expected false");
+        problems_leave(problems, mark);
+    }
+}
+
 static void check_tank_planes(void *object, Problems *problems) {
     const SceneTank *tank = object;
     if (tank->type == SCENE_TANK_PLANES && tank->planes.count < 4) {
@@ -199,16 +311,21 @@ static void check_tank_planes(void *object, Problems *problems) {
 }
 
 static const Field tank_fields[] = {
-    {ROW(FIELD_ENUM, SceneTank, type, "type"), .names = "box|mesh|planes", .flags = FIELD_REQUIRED,
-     .help = "What the walls are"},
+    {ROW(FIELD_ENUM, SceneTank, type, "type"), .names = "box|mesh|planes|sphere|cylinder|star|cone",
+     .flags = FIELD_REQUIRED, .help = "What the walls are"},
     {ROW(FIELD_VEC3, SceneTank, min, "min"), COORDINATE, .flags = FIELD_REQUIRED, .variants = BOX,
      .help = "Corner of the box with the smallest coordinates"},
     {ROW(FIELD_VEC3, SceneTank, max, "max"), COORDINATE, .flags = FIELD_REQUIRED, .variants = BOX,
      .help = "Corner of the box with the largest coordinates"},
-    {ROW(FIELD_BOOL, SceneTank, open, "open"), .variants = BOX, .help = "No lid"},
+    {ROW(FIELD_BOOL, SceneTank, open, "open"), .variants = BOX | UPRIGHT, .help = "No lid"},
     {ROW(FIELD_FILE, SceneTank, file, "geometryFile"), .flags = FIELD_REQUIRED, .variants = MESH,
      .help = "OBJ file of a closed mesh, relative to the scene; the fluid is inside it"},
-    PLACEMENT_ROWS(SceneTank, MESH),
+    BRANCHES_ROW(SceneTank, round.branches, STAR),
+    RADIUS_ROW(SceneTank, round.radius, SPHERE | UPRIGHT),
+    INNER_RADIUS_ROW(SceneTank, round.inner_radius, STAR),
+    TOP_RADIUS_ROW(SceneTank, round.top_radius, CONE),
+    HEIGHT_ROW(SceneTank, round.height, UPRIGHT),
+    PLACEMENT_ROWS(SceneTank, MESH | SPHERE | UPRIGHT),
     {ROW(FIELD_LIST, SceneTank, planes, "planes"), .max = 1000, .flags = FIELD_REQUIRED, .variants = PLANES,
      .object = &plane_type, .help = "Flat walls around a convex tank"},
     {ROW(FIELD_FLOAT, SceneTank, wet_height, "wetHeight"), COORDINATE, .flags = FIELD_NULLABLE,
@@ -217,6 +334,8 @@ static const Field tank_fields[] = {
 
 static const FieldRule tank_rules[] = {{"type|min|max", check_tank_box},
                                        {"rotationAxis|rotationAngle", check_tank_rotation},
+                                       {"type|radius|innerRadius", check_tank_star},
+                                       {"type|open|rotationAxis|rotationAngle", check_tank_open},
                                        {"type|planes", check_tank_planes}};
 
 static const ObjectType tank_type = {.help = "The walls around the fluid",
@@ -321,6 +440,13 @@ static const Field body_fields[] = {
      .group = GROUP_SHAPE, .help = "Edge lengths of a box around its own origin"},
     {ROW(FIELD_FLOAT, SceneBody, sphere, "sphere"), LENGTH, .flags = FIELD_REQUIRED | FIELD_NULLABLE,
      .group = GROUP_SHAPE, .help = "Radius of a sphere around its own origin"},
+    {ROW(FIELD_OBJECT, SceneBody, cylinder, "cylinder"), .flags = FIELD_REQUIRED | FIELD_NULLABLE,
+     .group = GROUP_SHAPE, .object = &cylinder_type, .help = "An upright cylinder around its own origin"},
+    {ROW(FIELD_OBJECT, SceneBody, star, "star"), .flags = FIELD_REQUIRED | FIELD_NULLABLE,
+     .group = GROUP_SHAPE, .object = &star_type, .help = "An upright star prism around its own origin"},
+    {ROW(FIELD_OBJECT, SceneBody, cone, "cone"), .flags = FIELD_REQUIRED | FIELD_NULLABLE,
+     .group = GROUP_SHAPE, .object = &cone_type,
+     .help = "An upright cone or truncated cone around its own origin"},
     PLACEMENT_ROWS(SceneBody, 0),
     {ROW(FIELD_FLOAT, SceneBody, density, "density"), .min = 1e-3, .max = 1e6, .unit = "kg/m^3",
      .flags = FIELD_NULLABLE, .group = GROUP_WEIGHT,

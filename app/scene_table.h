@@ -12,7 +12,21 @@ typedef struct SceneConfiguration {
     float domain_min[3], domain_max[3]; /* NaN: absent */
 } SceneConfiguration;
 
-typedef enum SceneTankType { SCENE_TANK_BOX, SCENE_TANK_MESH, SCENE_TANK_PLANES } SceneTankType;
+typedef enum SceneTankType {
+    SCENE_TANK_BOX,
+    SCENE_TANK_MESH,
+    SCENE_TANK_PLANES,
+    SCENE_TANK_SPHERE,
+    SCENE_TANK_CYLINDER,
+    SCENE_TANK_STAR,
+    SCENE_TANK_CONE
+} SceneTankType;
+
+/* Sizes of a sphere, cylinder, star or cone: what SkiffGeometryDef calls them. */
+typedef struct SceneRound {
+    float radius, inner_radius, top_radius, height;
+    int branches;
+} SceneRound;
 
 typedef struct ScenePlane {
     float point[3], normal[3];
@@ -28,6 +42,7 @@ typedef struct SceneTank {
     float min[3], max[3];
     bool open;
     const char *file;
+    SceneRound round;
     ScenePlacement placement;
     FieldList planes; /* of ScenePlane */
     float wet_height;
@@ -35,9 +50,10 @@ typedef struct SceneTank {
 
 typedef struct SceneBody {
     const char *name;
-    const char *file; /* one of these three; NULL, NaN: absent */
+    const char *file; /* one of these six; NULL, NaN: absent */
     float box[3];
     float sphere;
+    SceneRound *cylinder, *star, *cone;
     ScenePlacement placement;
     float density, mass; /* one of these; NaN: absent */
     float velocity[3], angular_velocity[3];

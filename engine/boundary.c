@@ -68,8 +68,21 @@ static void offset_directions(const Mesh *mesh, double (*normal_sums)[3], double
     }
 }
 
-/* The mesh with its faces moved behind the surface, seen from the water. A body thinner than two offsets gets
- * a part of it: its sides would trade places. */
+/* Moves a vertex of a body inwards, by as much of the offset as keeps it well inside: where the body is
+ * thinner than two offsets (a stem, a mast, a coaming) its sides would trade places. */
+static void offset_vertex(const SurfaceDef *surface, const float vertex[3], const double direction[3],
+                          float moved[3]) {
+    for (float share = 1.0f;; share = share > 0.1f ? 0.5f * share : 0.0f) {
+        const float sign = surface->water_inside ? 1.0f : -1.0f, distance = share * surface->offset;
+        for (int k = 0; k < 3; k++)
+            moved[k] = vertex[k] + sign * distance * (float)direction[k];
+        if (surface->water_inside || share == 0.0f ||
+            mesh_distance(surface->mesh, moved, NULL) < -0.5f * distance)
+            return;
+    }
+}
+
+/* The mesh with its faces moved behind the surface, seen from the water. */
 static bool offset_mesh(const SurfaceDef *surface, Mesh *moved, Err *err) {
     const Mesh *mesh = surface->mesh;
     double(*directions)[3] = calloc(mesh->vertex_count, sizeof *directions);
@@ -83,17 +96,8 @@ static bool offset_mesh(const SurfaceDef *surface, Mesh *moved, Err *err) {
         offset_directions(mesh, directions, tensors);
         memcpy(moved->triangles, mesh->triangles, mesh->triangle_count * sizeof *moved->triangles);
     }
-    bool good = false;
-    for (float share = 1.0f; memory && !good; share = share > 0.1f ? 0.5f * share : 0.0f) {
-        const float distance = share * surface->offset, sign = surface->water_inside ? 1.0f : -1.0f;
-        good = true;
-        for (uint32_t v = 0; v < mesh->vertex_count; v++) {
-            for (int k = 0; k < 3; k++)
-                moved->vertices[v][k] = mesh->vertices[v][k] + sign * distance * (float)directions[v][k];
-            good = good && (surface->water_inside || share == 0.0f ||
-                            mesh_distance(mesh, moved->vertices[v], NULL) < -0.5f * distance);
-        }
-    }
+    for (uint32_t v = 0; memory && v < mesh->vertex_count; v++)
+        offset_vertex(surface, mesh->vertices[v], directions[v], moved->vertices[v]);
     free(directions);
     free(tensors);
     if (!memory) {

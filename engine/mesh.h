@@ -6,12 +6,17 @@
 
 #include <stdint.h>
 
+enum { MESH_MAX_MATERIALS = 256, MESH_NAME_SIZE = 32 };
+
 /* Positions in metres, right-handed, y up; triangles counter-clockwise seen from outside. */
 typedef struct Mesh {
     float (*vertices)[3];
     uint32_t (*triangles)[3];
     uint32_t vertex_count;
     uint32_t triangle_count;
+    uint8_t *materials; /* of each triangle, an index into the names; NULL: all of one nameless material */
+    char (*material_names)[MESH_NAME_SIZE];
+    uint32_t material_count;
     float min[3], max[3];  /* bounds of the referenced vertices */
     struct MeshTree *tree; /* distance queries; built by mesh_build_tree */
 } Mesh;
@@ -28,10 +33,12 @@ typedef struct MeshMass {
 /* Every maker of a mesh leaves *mesh all zero when it fails, so that mesh_free is always allowed.
  *
  * Reads v and f records (triangles and polygons, which are fanned from their first corner: they should be
- * convex; negative indices; v/vt/vn forms); other records are ignored. ERR_INPUT with file:line on anything
+ * convex; negative indices; v/vt/vn forms), and usemtl records, of which the names are kept (faces before the
+ * first one: ""); other records are ignored. ERR_INPUT with file:line on anything
  * malformed: coordinates that are not finite or beyond 1e9, index out of range, fewer than 3 corners, a
- * corner repeated. Vertices that coincide exactly are merged, so that meshes with split normals are still
- * closed; triangles that collapse by it carry no surface and are left out. */
+ * corner repeated, a material's name that is missing or longer than MESH_NAME_SIZE - 1, too many of them.
+ * Vertices that coincide exactly are merged, so that meshes with split normals are still closed; triangles
+ * that collapse by it carry no surface and are left out. */
 bool mesh_load_obj(const char *path, Mesh *mesh, Err *err);
 bool mesh_parse_obj(const char *name, const char *text, size_t size, Mesh *mesh, Err *err);
 /* Axis-aligned box, 8 vertices, 12 triangles. */

@@ -206,10 +206,12 @@ static inline float cone_at(const Shape *shape, const float point[3], bool sides
     float distance = edge_distance(edge, low, high, profile, gradient ? slope : NULL);
     if (!sides) {
         const float cap = fabsf(own[1]) - shape->half[1];
-        const bool above = own[1] > 0.0f, inside = distance < 0.0f && cap <= 0.0f;
-        const bool over_cap = profile[0] <= (above ? shape->top_radius : shape->radius);
-        const bool to_cap = inside ? cap > distance : cap > 0.0f && over_cap;
-        const bool around = !inside && !to_cap && distance < 0.0f; /* the rim, from beyond the side's end */
+        const bool above = own[1] > 0.0f;
+        const float cap_radius = above ? shape->top_radius : shape->radius;
+        /* & and |, as && and || would be branches */
+        const bool inside = (distance < 0.0f) & (cap <= 0.0f);
+        const bool to_cap = (inside & (cap > distance)) | ((cap > 0.0f) & (profile[0] <= cap_radius));
+        const bool around = !(inside | to_cap) & (distance < 0.0f); /* the rim, from beyond the side's end */
         if (gradient) {
             slope[0] = to_cap ? 0.0f : around ? -slope[0] : slope[0];
             slope[1] = to_cap ? (above ? 1.0f : -1.0f) : around ? -slope[1] : slope[1];

@@ -241,6 +241,11 @@ void skiff_body_push(SkiffSim *sim, int index, const double force[3], const doub
  * world. Owned by the simulation. */
 void skiff_body_mesh(const SkiffSim *sim, int index, const float (**vertices)[3], uint32_t *vertex_count,
                      const uint32_t (**triangles)[3], uint32_t *triangle_count);
+/* The material of each of these triangles, as an index, and the name of each material (from the OBJ file's
+ * usemtl records). NULL: no materials. Owned by the simulation. */
+const uint8_t *skiff_body_materials(const SkiffSim *sim, int index);
+/* "" past the last one, and for faces before the first record. */
+const char *skiff_body_material_name(const SkiffSim *sim, int index, int material);
 
 /* The surface of the tank, window-local; no triangles where there is none. Owned by the simulation. */
 void skiff_tank_mesh(const SkiffSim *sim, const float (**vertices)[3], uint32_t *vertex_count,

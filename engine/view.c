@@ -95,6 +95,15 @@ void skiff_tank_mesh(const SkiffSim *sim, const float (**vertices)[3], uint32_t 
     look_at_mesh(&sim->tank.mesh, vertices, vertex_count, triangles, triangle_count);
 }
 
+const uint8_t *skiff_body_materials(const SkiffSim *sim, int index) {
+    return sim->bodies[index].mesh.materials;
+}
+
+const char *skiff_body_material_name(const SkiffSim *sim, int index, int material) {
+    const Mesh *mesh = &sim->bodies[index].mesh;
+    return (uint32_t)material < mesh->material_count ? mesh->material_names[material] : "";
+}
+
 uint64_t skiff_hash(const SkiffSim *sim) {
     XXH3_state_t state;
     XXH3_64bits_reset(&state);
