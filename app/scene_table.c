@@ -625,7 +625,8 @@ static const Field camera_fields[] = {
     {ROW(FIELD_VEC3, SceneCamera, target, "target"), COORDINATE, .flags = FIELD_NULLABLE,
      .help = "Point in the world that is looked at where no body is followed"},
     {ROW(FIELD_VEC3, SceneCamera, forward, "forward"), .min = -1e6, .max = 1e6, .flags = FIELD_NULLABLE,
-     .help = "Direction of the body's bow in the world at the start; absent: of its drive, or +x"},
+     .help =
+         "Direction of the body's bow in the world at the start; absent: where -x of its geometry points"},
     {ROW(FIELD_FLOAT, SceneCamera, distance, "distance"), OPTIONAL_LENGTH,
      .help = "chase, orbit: horizontal distance from the body; top: height above it"},
     {ROW(FIELD_FLOAT, SceneCamera, height, "height"), COORDINATE, .flags = FIELD_NULLABLE,
@@ -707,7 +708,7 @@ static const Field render_fields[] = {
      .help = "That begins: one of `cameras` or chase, fixed, orbit, top, bow, which always exist"},
     {ROW(FIELD_LIST, SceneRender, cameras, "cameras"), .max = 100, .object = &camera_type, .help = "Cameras"},
     {ROW(FIELD_LIST, SceneRender, bodies, "bodies"), .max = 10000, .object = &material_type,
-     .help = "Materials of bodies; others are painted"},
+     .help = "What bodies are made of; others have the colours of their meshes' materials, or a plain one"},
 };
 
 static const FieldRule render_rules[] = {{"sun", check_sun}, {"fieldMin|fieldMax", check_field_range}};

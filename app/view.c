@@ -10,6 +10,7 @@
 #include "edge_map.h"
 #include "foam.h"
 #include "nearest.h"
+#include "palette.h"
 #include "shade.h"
 
 #include "engine/base/file.h"
@@ -138,12 +139,21 @@ static bool unknown_body(const View *view, const char *list, int index, const ch
 
 /* ---- Cameras ---- */
 
-/* Where the body's bow points at the start, world axes. */
+/* Where the body's bow points at the start, world axes: boats point towards -x in their own frame, as in
+ * [Carensac2023]. */
 static void bow_of(const SkiffDef *def, int body, double bow[3]) {
-    (void)def;
-    (void)body;
-    bow[0] = 1;
-    bow[1] = bow[2] = 0;
+    const SkiffGeometryDef *geometry = &def->bodies[body].geometry;
+    const double own[3] = {-1, 0, 0};
+    double axis[3], half = 0.5 * (double)geometry->rotation_angle, length = 0;
+    for (int k = 0; k < 3; k++) {
+        axis[k] = (double)geometry->rotation_axis[k];
+        length += axis[k] * axis[k];
+    }
+    double scale = length > 0 ? sin(half) / sqrt(length) : 0;
+    const double q[4] = {scale * axis[0], scale * axis[1], scale * axis[2], length > 0 ? cos(half) : 1};
+    gfx_camera_rotate(q, own, bow);
+    if (hypot(bow[0], bow[2]) < 1e-6) /* upright: any course will do */
+        memcpy(bow, own, sizeof own);
 }
 
 static void keep(double *value, float given) {
@@ -343,16 +353,21 @@ static bool cut_to_camera(View *view, const char *name, Err *err) {
 
 /* ---- Meshes ---- */
 
-static GfxMaterial material_of(const View *view, int body, double height, double level) {
-    static const GfxMaterialKind kinds[] = {GFX_MATERIAL_PAINT, GFX_MATERIAL_HULL, GFX_MATERIAL_STONE};
-    const SkiffBodyDef *def = &view->scene->def.bodies[body];
+/* What the scene says a body is made of; NULL: nothing. */
+static const SceneMaterial *find_material(const View *view, int body) {
     const FieldList *list = &view->options.render.bodies;
     const SceneMaterial *given = NULL;
     for (int i = 0; i < list->count; i++)
-        if (strcmp(((const SceneMaterial *)list->items)[i].name, def->name) == 0)
+        if (strcmp(((const SceneMaterial *)list->items)[i].name, view->scene->def.bodies[body].name) == 0)
             given = (const SceneMaterial *)list->items + i;
+    return given;
+}
+
+/* `height`: of the body's centre at the start; `level`: of the water, m. */
+static GfxMaterial material_of(const SceneMaterial *given, bool is_fixed, double height, double level) {
+    static const GfxMaterialKind kinds[] = {GFX_MATERIAL_PAINT, GFX_MATERIAL_HULL, GFX_MATERIAL_STONE};
     if (!given)
-        return gfx_material_default(def->free_axes != 0 ? GFX_MATERIAL_PAINT : GFX_MATERIAL_STONE);
+        return gfx_material_default(is_fixed ? GFX_MATERIAL_STONE : GFX_MATERIAL_PAINT);
     GfxMaterial material = gfx_material_default(kinds[given->material]);
     if (!isnan(given->color[0]))
         memcpy(material.color, given->color, sizeof material.color);
@@ -361,6 +376,16 @@ static GfxMaterial material_of(const View *view, int body, double height, double
     material.cabin_base = cabin ? (float)((double)given->cabin_base - height) : 0;
     material.cabin_top = cabin ? (float)((double)given->cabin_top - height) : 0;
     return material;
+}
+
+/* A colour for each triangle, by the names of the mesh's materials. NULL: it has none, or there is no memory;
+ * malloc'ed. */
+static uint8_t (*triangle_colors(const SkiffSim *sim, int body, uint32_t count))[3] {
+    const uint8_t *materials = skiff_body_materials(sim, body);
+    uint8_t(*colors)[3] = materials ? malloc(((size_t)count + 1) * sizeof *colors) : NULL;
+    for (uint32_t t = 0; colors && t < count; t++)
+        memcpy(colors[t], palette_color(skiff_body_material_name(sim, body, materials[t])), sizeof colors[t]);
+    return colors;
 }
 
 static bool add_instance(View *view, const GfxMeshDef *mesh, Err *err) {
@@ -384,10 +409,17 @@ static bool make_meshes(View *view, const SkiffSim *sim, double level, Err *err)
     GfxMeshDef mesh = {0};
     for (int i = 0; i < body_count; i++) {
         skiff_body_mesh(sim, i, &mesh.vertices, &mesh.vertex_count, &mesh.triangles, &mesh.triangle_count);
-        mesh.material = material_of(view, i, skiff_body(sim, i).position[1], level);
-        if (!add_instance(view, &mesh, err))
+        const SceneMaterial *given = find_material(view, i);
+        uint8_t(*colors)[3] = given ? NULL : triangle_colors(sim, i, mesh.triangle_count);
+        bool is_fixed = view->scene->def.bodies[i].free_axes == 0 && !colors;
+        mesh.material = material_of(given, is_fixed, skiff_body(sim, i).position[1], level);
+        mesh.triangle_colors = (const uint8_t(*)[3])colors;
+        bool added = add_instance(view, &mesh, err);
+        free(colors);
+        if (!added)
             return false;
     }
+    mesh.triangle_colors = NULL;
     skiff_tank_mesh(sim, &mesh.vertices, &mesh.vertex_count, &mesh.triangles, &mesh.triangle_count);
     view->has_tank = mesh.triangle_count > 0;
     mesh.material = gfx_material_default(GFX_MATERIAL_TANK);

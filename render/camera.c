@@ -42,7 +42,7 @@ GfxCameraDef gfx_camera_default(GfxCameraKind kind) {
 }
 
 /* v + 2 q x (q x v + w v) */
-static void rotate(const double q[4], const double v[3], double out[3]) {
+void gfx_camera_rotate(const double q[4], const double v[3], double out[3]) {
     double t[3] = {q[1] * v[2] - q[2] * v[1] + q[3] * v[0], q[2] * v[0] - q[0] * v[2] + q[3] * v[1],
                    q[0] * v[1] - q[1] * v[0] + q[3] * v[2]};
     double u[3] = {v[0] + 2 * (q[1] * t[2] - q[2] * t[1]), v[1] + 2 * (q[2] * t[0] - q[0] * t[2]),
@@ -75,7 +75,7 @@ static void spring_move(GfxSpring *spring, double goal, double dt, double smooth
  */
 static double heading_of(const GfxCameraDef *def, const GfxPose *pose, double last) {
     double bow[3];
-    rotate(pose->rotation, def->forward, bow);
+    gfx_camera_rotate(pose->rotation, def->forward, bow);
     if (hypot(bow[0], bow[2]) < 1e-6 * fabs(bow[1]))
         return last;
     double angle = atan2(bow[2], bow[0]);
@@ -114,9 +114,9 @@ static void look_from(const GfxCameraDef *def, const double centre[3], double an
 static void look_on_board(const GfxCameraDef *def, const GfxPose *pose, GfxCameraView *view) {
     double eye[3], bow[3];
     const double vertical[3] = {0, 1, 0};
-    rotate(pose->rotation, def->eye, eye);
-    rotate(pose->rotation, def->forward, bow);
-    rotate(pose->rotation, vertical, view->up);
+    gfx_camera_rotate(pose->rotation, def->eye, eye);
+    gfx_camera_rotate(pose->rotation, def->forward, bow);
+    gfx_camera_rotate(pose->rotation, vertical, view->up);
     double length = sqrt(bow[0] * bow[0] + bow[1] * bow[1] + bow[2] * bow[2]);
     for (int k = 0; k < 3; k++) {
         view->eye[k] = pose->position[k] + eye[k];

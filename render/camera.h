@@ -64,4 +64,7 @@ typedef struct GfxCameraState {
 GfxCameraView gfx_camera_update(const GfxCameraDef *def, GfxCameraState *state, const GfxPose *pose,
                                 double time);
 
+/* A vector turned by a unit quaternion x y z w. out may be v. */
+void gfx_camera_rotate(const double q[4], const double v[3], double out[3]);
+
 #endif
