@@ -205,3 +205,45 @@ bool foam_update(Foam *foam, const Frame *frame, float *amount, Err *err) {
     foam->is_started = true;
     return true;
 }
+
+/* ---- Keeping it ---- */
+
+double foam_time(const Foam *foam) {
+    return foam->time;
+}
+
+uint32_t foam_count(const Foam *foam) {
+    uint32_t count = 0;
+    for (size_t i = 0; foam->now.entries && i <= foam->now.mask; i++)
+        count += foam->now.entries[i].key != 0;
+    return count;
+}
+
+void foam_store(const Foam *foam, uint64_t *id, float *amount) {
+    size_t used = 0;
+    for (size_t i = 0; foam->now.entries && i <= foam->now.mask; i++)
+        if (foam->now.entries[i].key != 0) {
+            id[used] = foam->now.entries[i].key - 1;
+            amount[used++] = foam->now.entries[i].amount;
+        }
+}
+
+bool foam_restore(Foam *foam, double time, uint64_t count, const uint64_t *id, const float *amount,
+                  Err *err) {
+    if (count > UINT32_MAX || !empty_table(&foam->now, (uint32_t)count))
+        return err_set(err, ERR_INPUT, "not enough memory for the foam of %llu particles",
+                       (unsigned long long)count);
+    for (uint64_t i = 0; i < count; i++) {
+        Entry *entry = &foam->now.entries[place_of(&foam->now, id[i] + 1)];
+        bool is_good = entry->key == 0 && id[i] != UINT64_MAX && amount[i] >= 0 && amount[i] <= 1;
+        if (!is_good && !empty_table(&foam->now, 0))
+            return err_set(err, ERR_INPUT, "not enough memory for foam");
+        if (!is_good)
+            return err_set(err, ERR_INPUT, "foam of id %llu stands there twice or is out of range",
+                           (unsigned long long)id[i]);
+        *entry = (Entry){id[i] + 1, amount[i]};
+    }
+    foam->time = time;
+    foam->is_started = count > 0;
+    return true;
+}

@@ -401,7 +401,7 @@ bool frames_remove_sequence(const char *output, const char *folder, const char *
 }
 
 bool frames_remove(const char *output, Err *err) {
-    static const char *const names[] = {"video.mp4", "video.mp4.tmp"};
+    static const char *const names[] = {"video.mp4", "video.mp4.tmp", "view.skiff"};
     char path[PATH_SIZE];
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         snprintf(path, sizeof path, "%.4000s/%s", output, names[i]);

@@ -194,7 +194,7 @@ static bool after_step(Run *run, Err *err) {
         run->next_flush = now + flush_period;
     }
     if (now >= run->next_checkpoint) {
-        if (!checkpoint(run, "state.skiff", err))
+        if (!checkpoint(run, "state.skiff", err) || !view_save(run->view, err))
             return false;
         run->next_checkpoint = progress_clock() + run->args->checkpoint_every;
     }
@@ -272,7 +272,7 @@ static bool end_diverged(Run *run, Err *err) {
 static bool end_normally(Run *run, Err *err) {
     bool interrupted = !is_finished(run);
     RunEnd end = {interrupted ? "interrupted" : "finished", ""};
-    if (!view_finish(run->view, err) || !checkpoint(run, "state.skiff", err) ||
+    if (!view_finish(run->view, err) || !checkpoint(run, "state.skiff", err) || !view_save(run->view, err) ||
         !tables_close(&run->tables, err) || !write_results(run, &end, err))
         return false;
     return !interrupted ||

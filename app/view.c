@@ -4,7 +4,8 @@
  * Frame n shows the time start + (n - 1) / fps, whatever the step. A drawn frame depends on the scene, the
  * options and the frames before it, not on the wall clock, unless the figures include it (--hud timing).
  *
- * Foam and smoothed cameras remember the frames before; after --resume they begin anew. */
+ * Foam and smoothed cameras remember the frames before. view.skiff keeps that beside each checkpoint, so that
+ * a resumed run draws the frames that it would have drawn. */
 #include "view.h"
 
 #include "edge_map.h"
@@ -12,6 +13,7 @@
 #include "nearest.h"
 #include "palette.h"
 #include "shade.h"
+#include "view_memory.h"
 
 #include "engine/base/file.h"
 #include "engine/base/log.h"
@@ -27,7 +29,6 @@ typedef struct ViewCamera {
     const char *name;
     int body; /* that is followed; -1: none */
     GfxCameraDef def;
-    GfxCameraState state;
 } ViewCamera;
 
 /* A sequence of moments: number n lies at start + (n - 1) / rate. */
@@ -53,6 +54,7 @@ struct View {
 
     /* what is in it */
     ViewCamera *cameras;
+    GfxCameraState *states; /* of the cameras */
     int camera_count, camera;
     GfxInstance *instances; /* bodies, then the tank */
     uint32_t instance_count;
@@ -190,25 +192,6 @@ static void suit_body(GfxCameraDef *def, const SkiffSim *sim, int body) {
     }
 }
 
-static double dot(const double a[3], const double b[3]) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-/* From how far away, in the direction `from`, a box of these half lengths just fits into the picture. */
-static double fitting_distance(const double half[3], const double from[3], double fov_deg, double aspect) {
-    const double flat = hypot(from[0], from[2]);
-    const double right[3] = {from[2] / flat, 0, -from[0] / flat};
-    const double up[3] = {-from[1] * from[0] / flat, flat, -from[1] * from[2] / flat};
-    double slope = tan(0.5 * fov_deg * 3.14159265358979323846 / 180), distance = 0;
-    for (int c = 0; c < 8; c++) {
-        const double corner[3] = {c & 1 ? half[0] : -half[0], c & 2 ? half[1] : -half[1],
-                                  c & 4 ? half[2] : -half[2]};
-        double across = fmax(fabs(dot(corner, right)) / aspect, fabs(dot(corner, up)));
-        distance = fmax(distance, dot(corner, from) + across / slope);
-    }
-    return distance;
-}
-
 /* Everything in the picture, seen from in front and above. */
 static void suit_scene(GfxCameraDef *def, const SkiffSim *sim, const Frame *frame, double aspect) {
     static const double from[3] = {0.35, 0.42, 0.8375}; /* of length 1 */
@@ -222,7 +205,7 @@ static void suit_scene(GfxCameraDef *def, const SkiffSim *sim, const Frame *fram
     }
     const double above[3] = {0, 1, 1e-9}; /* x to the right in the picture, as far as there is a choice */
     bool is_top = def->kind == GFX_CAMERA_TOP;
-    double distance = air * fitting_distance(half, is_top ? above : from, def->fov_deg, aspect);
+    double distance = air * gfx_camera_fit(half, is_top ? above : from, def->fov_deg, aspect);
     for (int k = 0; k < 3; k++)
         def->eye[k] = def->target[k] + distance * from[k];
     memcpy(def->forward, (const double[3]){is_top ? 0 : 1, 0, is_top ? -1 : 0}, sizeof def->forward);
@@ -259,7 +242,7 @@ static bool add_camera(View *view, const SceneCamera *camera, int index, const S
     keep(&def.azimuth, camera->azimuth);
     keep(&def.period, camera->period);
     keep(&def.smoothing, camera->smoothing);
-    view->cameras[view->camera_count++] = (ViewCamera){camera->name, subject, def, {0}};
+    view->cameras[view->camera_count++] = (ViewCamera){camera->name, subject, def};
     return true;
 }
 
@@ -288,7 +271,8 @@ static bool make_cameras(View *view, const SkiffSim *sim, Err *err) {
     const SceneCamera *given = render->cameras.items;
     int count = render->cameras.count;
     view->cameras = calloc((size_t)count + KINDS, sizeof *view->cameras);
-    if (!view->cameras)
+    view->states = calloc((size_t)count + KINDS, sizeof *view->states);
+    if (!view->cameras || !view->states)
         return err_set(err, ERR_INPUT, "not enough memory for %d cameras", count);
     for (int i = 0; i < count; i++) {
         if (find_camera(view, given[i].name) >= 0)
@@ -335,7 +319,7 @@ static GfxCameraView move_cameras(View *view, const Frame *frame) {
         if (camera->body >= 0)
             pose = pose_of(&frame->bodies[camera->body]);
         GfxCameraView seen =
-            gfx_camera_update(&camera->def, &camera->state, camera->body >= 0 ? &pose : NULL, frame->time);
+            gfx_camera_update(&camera->def, &view->states[i], camera->body >= 0 ? &pose : NULL, frame->time);
         if (i == view->camera)
             current = seen;
     }
@@ -674,6 +658,43 @@ static bool add_old_frames(View *view, Err *err) {
     return true;
 }
 
+/* ---- What must outlive an interruption ---- */
+
+enum { CAMERA_SCALARS = sizeof(GfxCameraState) / sizeof(double) };
+_Static_assert(sizeof(GfxCameraState) == 14 * sizeof(double), "it has no padding");
+
+static const char *memory_path(const View *view, char path[PATH_SIZE]) {
+    snprintf(path, PATH_SIZE, "%.4000s/view.skiff", view->output);
+    return path;
+}
+
+static ViewMemory memory_of(const View *view) {
+    return (ViewMemory){.time = view->before_time,
+                        .camera = view->camera,
+                        .states = (double *)view->states,
+                        .state_count = (uint64_t)view->camera_count * CAMERA_SCALARS,
+                        .foam = view->foam};
+}
+
+bool view_save(const View *view, Err *err) {
+    char path[PATH_SIZE];
+    if (!view || !view->foam)
+        return true;
+    ViewMemory memory = memory_of(view);
+    return view_memory_save(&memory, memory_path(view, path), err);
+}
+
+/* Without it the film goes on all the same. */
+static void load_memory(View *view) {
+    char path[PATH_SIZE];
+    Err err = {0};
+    ViewMemory memory = memory_of(view);
+    if (!view_memory_load(&memory, memory_path(view, path), &err))
+        log_write(LOG_WARNING, "foam and cameras begin anew: %s", err.message);
+    else if (!view->options.keeps_camera && memory.camera >= 0 && memory.camera < view->camera_count)
+        view->camera = memory.camera;
+}
+
 static void skip_to(const View *view, Sequence *sequence, double time) {
     while (time_of(view, sequence) <= time + frame_time_tolerance)
         sequence->next++;
@@ -704,6 +725,8 @@ bool view_begin(View *view, const SkiffSim *sim, const char *output, Err *err) {
     frame_poses(sim, view->before);
     view->before_time = skiff_time(sim);
     if (view->options.is_resumed) {
+        if (view->foam)
+            load_memory(view);
         skip_to(view, &view->draw, skiff_time(sim));
         skip_to(view, &view->save, skiff_time(sim));
         return !view->video || add_old_frames(view, err);
@@ -753,6 +776,7 @@ void view_destroy(View *view) {
     frame_free(&view->frame);
     free(view->rgb);
     free(view->cameras);
+    free(view->states);
     free(view->instances);
     edge_map_free(&view->edge_map);
     free(view->before);

@@ -33,6 +33,9 @@ bool view_begin(View *view, const SkiffSim *sim, const char *output, Err *err);
 /* After every step: draws and saves every frame whose time lies in it. */
 bool view_step(View *view, const SkiffSim *sim, const ViewControls *controls, Err *err);
 
+/* Keeps in view.skiff what the next frames depend on beside the simulation; for checkpoints. NULL is fine. */
+bool view_save(const View *view, Err *err);
+
 /* Draws frame `number` of the sequence from saved particles; call for each number from 1 on, also for those
  * that --frames leaves out: foam and cameras have a memory. */
 bool view_saved(View *view, const Frame *frame, int number, Err *err);

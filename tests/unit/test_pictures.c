@@ -192,9 +192,16 @@ static void a_resumed_run_goes_on_filming(void **unused) {
     assert_int_equal(count_frames("film"), 4);
     expect("run " SMALL " -o film --size 160x90 --fps 20 --video --resume -q", 0, "");
     assert_int_equal(count_frames("film"), 7);
+    expect("run " SMALL " -o whole --size 160x90 --fps 20 --render -q", 0, "");
+    for (int i = 1; i <= 7; i++) /* foam and cameras go on as if nothing had happened */
+        assert_true(same_frame("film", "whole", i));
     assert_int_equal(system("test \"$(ffprobe -v error -count_frames -select_streams v:0 -show_entries "
                             "stream=nb_read_frames -of csv=p=0 film/video.mp4)\" = 7"),
                      0);
+    assert_true(file_write("film/view.skiff", "rubbish", 7, NULL));
+    expect("run " SMALL " -o film --size 160x90 --fps 20 --resume --duration 0.36", 0,
+           "foam and cameras begin anew: film/view.skiff: ");
+    assert_int_equal(count_frames("film"), 8);
     /* A new run takes the old one's pictures away. */
     expect("run " SMALL " -o film --force --no-render --duration 0.006 -q", 0, "");
     assert_false(file_exists("film/video.mp4") || file_exists("film/frames"));
