@@ -17,7 +17,7 @@ enum {
     MAX_CELLS = 1 << 22,
     DEPTH_BINS = 4096,
     DROPLETS_EACH = 7,
-    ISOLATED_AT_MOST = 3, /* particles in 27 cells, itself included */
+    ALONE_AT_MOST = 4, /* particles in 3 x 3 x 3 fine cells, itself included */
 };
 enum {
     MEMORY_BODY,
@@ -25,6 +25,7 @@ enum {
     MEMORY_FADING,
     MEMORY_SORTED,
     MEMORY_CELLS,
+    MEMORY_FINE,
     MEMORY_COLUMNS,
     MEMORY_CELL_OF
 };
@@ -41,6 +42,7 @@ typedef struct Cells {
     int size[3]; /* with a margin of one empty cell on every side */
     float origin[3], inv_edge;
     uint16_t *count;
+    uint8_t *fine;   /* the same for cells of half the edge */
     uint8_t *column; /* 1: some particle is above or below */
     int32_t *cell_of;
     int open_below; /* counts below this make a cell open */
@@ -90,20 +92,30 @@ static bool make_cells(Cells *cells, Surface *surface, const GfxParticles *parti
     size_t columns = (size_t)cells->size[0] * (size_t)cells->size[2];
     Buffer *memory = surface->memory;
     if (!buffer_reserve(&memory[MEMORY_CELLS], "surface cells", count * sizeof *cells->count, err) ||
+        !buffer_reserve(&memory[MEMORY_FINE], "surface cells", 8 * count, err) ||
         !buffer_reserve(&memory[MEMORY_COLUMNS], "surface columns", columns, err) ||
         !buffer_reserve(&memory[MEMORY_CELL_OF], "surface particles",
                         particles->count * sizeof *cells->cell_of, err))
         return false;
     cells->count = memory[MEMORY_CELLS].data;
+    cells->fine = memory[MEMORY_FINE].data;
     cells->column = memory[MEMORY_COLUMNS].data;
     cells->cell_of = memory[MEMORY_CELL_OF].data;
     memset(cells->count, 0, count * sizeof *cells->count);
+    memset(cells->fine, 0, 8 * count);
     memset(cells->column, 0, columns);
     return true;
 }
 
 static int cell_coordinate(const Cells *cells, float x, int k) {
     return (int)((x - cells->origin[k]) * cells->inv_edge);
+}
+
+static size_t fine_cell(const Cells *cells, const float p[3]) {
+    size_t f[3];
+    for (int k = 0; k < 3; k++)
+        f[k] = (size_t)((p[k] - cells->origin[k]) * (2.0f * cells->inv_edge));
+    return (f[2] * 2 * (size_t)cells->size[0] + f[0]) * 2 * (size_t)cells->size[1] + f[1];
 }
 
 /* y runs fastest, so that columns are contiguous. */
@@ -114,7 +126,9 @@ static void count_particles(Cells *cells, const GfxParticles *particles) {
         int column = cell_coordinate(cells, p[2], 2) * cells->size[0] + x;
         int cell = column * cells->size[1] + y;
         cells->cell_of[i] = cell;
+        uint8_t *fine = &cells->fine[fine_cell(cells, p)];
         cells->column[column] = 1;
+        *fine += *fine < UINT8_MAX;
         if (fade_of(particles, i) >= SOLID_FADE && cells->count[cell] < UINT16_MAX)
             cells->count[cell]++;
     }
@@ -140,13 +154,15 @@ static bool is_outer(const Cells *cells, int cell, const int eye[3], bool ocean)
     return false;
 }
 
-static bool is_alone(const Cells *cells, int cell) {
+static bool is_alone(const Cells *cells, const float p[3]) {
+    size_t along_x = 2 * (size_t)cells->size[1], along_z = 2 * (size_t)cells->size[0] * along_x;
+    const uint8_t *corner = &cells->fine[fine_cell(cells, p) - along_z - along_x - 1];
     int total = 0;
-    for (int dz = -1; dz <= 1; dz++)
-        for (int dx = -1; dx <= 1; dx++)
-            for (int dy = -1; dy <= 1; dy++)
-                total += cells->count[cell + (dz * cells->size[0] + dx) * cells->size[1] + dy];
-    return total <= ISOLATED_AT_MOST;
+    for (size_t z = 0; z < 3; z++)
+        for (size_t x = 0; x < 3; x++)
+            for (size_t y = 0; y < 3; y++)
+                total += corner[z * along_z + x * along_x + y];
+    return total <= ALONE_AT_MOST;
 }
 
 /* ---- Droplets ---- */
@@ -265,7 +281,7 @@ bool surface_select(Surface *surface, const GfxScene *scene, GfxLook look, Err *
         int cell = cells.cell_of[i];
         if (!(fade > 0.0f) || !is_outer(&cells, cell, eye, water && scene->ocean.enabled))
             continue;
-        if (water && is_alone(&cells, cell)) {
+        if (water && is_alone(&cells, particles->position[i])) {
             cells.cell_of[i] = -1;
             continue;
         }

@@ -23,7 +23,7 @@ typedef struct Surface {
     SurfaceList body;     /* seen from the eye, in the order of the input */
     SurfaceList droplets; /* of particles that fly alone (water) */
     SurfaceList fading;   /* fade < 1, farthest first (particles) */
-    Buffer memory[8];
+    Buffer memory[10];
 } Surface;
 
 /* Fills the lists; memory is reused from call to call. ERR_USAGE: a particle is not finite (its index);
