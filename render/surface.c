@@ -30,9 +30,10 @@ enum {
     MEMORY_CELL_OF
 };
 
-/* A cell with less than this part of a full one is open. Spheres of half a spacing leave gaps, behind which a
- * third layer must stand; those of the water overlap. */
-#define OPEN_PART_WATER   0.25f
+/* A cell with less than this part of a full one is open. The smaller the spheres that are drawn, the more
+ * layers must stand behind their gaps. */
+#define OPEN_PART_OCEAN   0.25f
+#define OPEN_PART_TANK    0.45f
 #define OPEN_PART_SPHERES 0.60f
 #define SOLID_FADE        0.5f   /* what fades more than this hides nothing */
 #define DROPLET_SHOW      0.012f /* s of path shown by a droplet's stretch */
@@ -45,6 +46,7 @@ typedef struct Cells {
     uint8_t *fine;   /* the same for cells of half the edge */
     uint8_t *column; /* 1: some particle is above or below */
     int32_t *cell_of;
+    float full;     /* particles in a cell of water */
     int open_below; /* counts below this make a cell open */
 } Cells;
 
@@ -86,7 +88,8 @@ static bool make_cells(Cells *cells, Surface *surface, const GfxParticles *parti
     }
     cells->inv_edge = 1.0f / edge;
     float ratio = edge / particles->spacing;
-    float open = ceilf(open_part * ratio * ratio * ratio / WATER_PART);
+    cells->full = ratio * ratio * ratio / WATER_PART;
+    float open = ceilf(open_part * cells->full);
     cells->open_below = open > 60000.0f ? 60000 : (int)open;
     size_t count = (size_t)cells->size[0] * (size_t)cells->size[1] * (size_t)cells->size[2];
     size_t columns = (size_t)cells->size[0] * (size_t)cells->size[2];
@@ -254,20 +257,33 @@ static bool fill_droplets(Surface *surface, const Cells *cells, const GfxParticl
     return true;
 }
 
-static SurfacePoint make_point(const GfxParticles *particles, const float *values, uint32_t i, float fade) {
+/* How much the 27 cells around are filled: a quarter is a sheet, half the surface of a body of water. */
+static float bulk_of(const Cells *cells, int cell) {
+    int total = 0;
+    for (int z = -1; z <= 1; z++)
+        for (int x = -1; x <= 1; x++)
+            for (int y = -1; y <= 1; y++)
+                total += cells->count[cell + (z * cells->size[0] + x) * cells->size[1] + y];
+    float part = ((float)total / (27.0f * cells->full) - 0.20f) / 0.20f;
+    return part < 0.0f ? 0.0f : part > 1.0f ? 1.0f : part;
+}
+
+static SurfacePoint make_point(const GfxParticles *particles, const float *values, uint32_t i, float bulk) {
     const float *p = particles->position[i];
-    return (SurfacePoint){{p[0], p[1], p[2]}, fade, values ? values[i] : 0.0f};
+    return (SurfacePoint){{p[0], p[1], p[2]}, fade_of(particles, i), values ? values[i] : 0.0f, bulk};
 }
 
 bool surface_select(Surface *surface, const GfxScene *scene, GfxLook look, Err *err) {
     const GfxParticles *particles = &scene->particles;
     bool water = look == GFX_LOOK_WATER;
+    bool ocean = water && scene->ocean.enabled;
+    float open_part = ocean ? OPEN_PART_OCEAN : water ? OPEN_PART_TANK : OPEN_PART_SPHERES;
     Cells cells;
     if (!reserve_lists(surface, particles->count, err))
         return false;
     if (particles->count == 0)
         return true;
-    if (!make_cells(&cells, surface, particles, water ? OPEN_PART_WATER : OPEN_PART_SPHERES, err))
+    if (!make_cells(&cells, surface, particles, open_part, err))
         return false;
     count_particles(&cells, particles);
     int eye[3];
@@ -279,14 +295,14 @@ bool surface_select(Surface *surface, const GfxScene *scene, GfxLook look, Err *
     for (uint32_t i = 0; i < particles->count; i++) {
         float fade = fade_of(particles, i);
         int cell = cells.cell_of[i];
-        if (!(fade > 0.0f) || !is_outer(&cells, cell, eye, water && scene->ocean.enabled))
+        if (!(fade > 0.0f) || !is_outer(&cells, cell, eye, ocean))
             continue;
         if (water && is_alone(&cells, particles->position[i])) {
             cells.cell_of[i] = -1;
             continue;
         }
         SurfaceList *list = !water && fade < 1.0f ? &surface->fading : &surface->body;
-        list->points[list->count++] = make_point(particles, values, i, fade);
+        list->points[list->count++] = make_point(particles, values, i, water ? bulk_of(&cells, cell) : 0.0f);
     }
     if (water)
         return fill_droplets(surface, &cells, particles, err);

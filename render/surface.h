@@ -12,6 +12,7 @@ typedef struct SurfacePoint {
     float position[3]; /* local, m */
     float fade;        /* 0..1; droplets: opacity */
     float value;       /* body: foam or field; droplets: radius, m */
+    float bulk;        /* body of water: 0 in a thin sheet .. 1 */
 } SurfacePoint;
 
 typedef struct SurfaceList {

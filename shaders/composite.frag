@@ -66,15 +66,16 @@ vec4 see_through(Water water, float ray_length, vec2 bend, float thickness, vec3
     float own_depth = texelFetch(mesh_depth_image, ivec2(gl_FragCoord.xy), 0).r;
     vec2 at = uv + bend * 0.035;
     float buffer = textureLod(mesh_depth_image, at, 0.0).r;
-    if (mesh_depth(buffer) <= water.depth) { // that one stands in front of the water
+    bool in_front = mesh_depth(buffer) <= water.depth, gone = buffer == 1.0 && own_depth < 1.0;
+    if (in_front || gone) { // of the water; past the edge of what stands behind
         at = uv;
         buffer = own_depth;
     }
     bool mesh_behind = buffer < 1.0;
     float under = mesh_behind ? max(mesh_depth(buffer) - water.depth, 0.0) * ray_length : edge.z > 0.0 ? 8.0 : 3.0;
-    // In the air only what is thick is a body of water; the rest are sheets.
+    // In the air only what is thick is a body of water; the rest are sheets. (Particles inside a body count as much more.)
     if (edge.z == 0.0 || water.place.y > eye.w + 0.25)
-        under = mix(min(under, thickness), under, smoothstep(0.18, 0.40, thickness));
+        under = mix(min(under, thickness), under, smoothstep(0.12, 0.40, thickness));
     return vec4(mesh_behind ? textureLod(mesh_image, at, 0.0).rgb : empty, under);
 }
 
@@ -119,17 +120,17 @@ vec3 shade(Water water, vec3 direction, float ray_length, vec3 background, vec3 
     narrow *= narrow; // 256
     narrow *= narrow * narrow * narrow; // 1024
     float glint = 2.4 * narrow + 0.20 * broad;
-    vec2 bend = (mat3(view) * (n - vec3(0.0, 1.0, 0.0))).xy;
+    vec2 bend = (mat3(view) * (n - vec3(0.0, max(n.y, 0.0), 0.0))).xy;
     vec4 mesh_mirrored = textureLod(reflection_image, uv + bend * vec2(0.16, 0.20) / max(1.0, 0.5 * far), 0.0);
     mirrored = mix(mirrored, mesh_mirrored.rgb, mesh_mirrored.a);
     glint *= 1.0 - mesh_mirrored.a;
 
     vec2 sums = textureLod(thickness_image, uv, 0.0).rg;
     bool ocean = edge.z > 0.0;
-    vec3 deep = ocean ? vec3(0.010, 0.135, 0.200) : vec3(0.02, 0.30, 0.38);
+    vec3 deep = ocean ? vec3(0.010, 0.135, 0.200) : vec3(0.03, 0.26, 0.33);
     // Faces turned to the sun let more light in.
-    deep *= 1.0 + 1.3 * dot(n.xz, sun.xz);
-    vec3 absorption = ocean ? vec3(3.2, 1.05, 0.75) : vec3(1.5, 0.38, 0.22);
+    deep *= max(1.0 + 1.3 * dot(n.xz, sun.xz), 0.6);
+    vec3 absorption = ocean ? vec3(3.2, 1.05, 0.75) : vec3(0.95, 0.24, 0.15);
     // Light through thin crests and steep faces.
     float crest = clamp((water.place.y - eye.w) * 4.0 + 0.10, 0.0, 1.0) * water.fluid;
     float through = 0.5 - 0.5 * dot(direction, sun.xyz);
