@@ -47,10 +47,10 @@ _Static_assert((int)COUNT <= (int)FRAME_MAX_PASSES, "GfxStats and skip_passes ha
 static const struct {
     float tile, slope, direction, speed;
 } ripple_layers[RIPPLE_LAYERS] = {
-    {19.0f, 0.11f, 0.45f, 1.9f},
-    {6.7f, 0.13f, 0.10f, 1.15f},
-    {2.9f, 0.13f, 0.85f, 0.70f},
-    {1.13f, 0.10f, 0.30f, 0.42f},
+    {19.0f, 0.09f, 0.45f, 1.9f},
+    {6.7f, 0.12f, 0.10f, 1.15f},
+    {2.9f, 0.14f, 0.85f, 0.70f},
+    {1.13f, 0.15f, 0.30f, 0.42f},
 };
 
 int frame_pass_count(void) {

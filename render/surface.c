@@ -35,6 +35,7 @@ enum {
 #define OPEN_PART_OCEAN   0.25f
 #define OPEN_PART_TANK    0.45f
 #define OPEN_PART_SPHERES 0.60f
+#define CALM_HEIGHT       0.15f  /* m above still water; below it the sea has no bottom to be seen */
 #define SOLID_FADE        0.5f   /* what fades more than this hides nothing */
 #define DROPLET_SHOW      0.012f /* s of path shown by a droplet's stretch */
 #define WATER_PART        0.8f   /* mass of a particle / (rho0 d^3) */
@@ -278,6 +279,8 @@ bool surface_select(Surface *surface, const GfxScene *scene, GfxLook look, Err *
     bool water = look == GFX_LOOK_WATER;
     bool ocean = water && scene->ocean.enabled;
     float open_part = ocean ? OPEN_PART_OCEAN : water ? OPEN_PART_TANK : OPEN_PART_SPHERES;
+    float calm_level = scene->ocean.level + CALM_HEIGHT;
+    uint32_t plain = 0;
     Cells cells;
     if (!reserve_lists(surface, particles->count, err))
         return false;
@@ -301,9 +304,19 @@ bool surface_select(Surface *surface, const GfxScene *scene, GfxLook look, Err *
             cells.cell_of[i] = -1;
             continue;
         }
-        SurfaceList *list = !water && fade < 1.0f ? &surface->fading : &surface->body;
-        list->points[list->count++] = make_point(particles, values, i, water ? bulk_of(&cells, cell) : 0.0f);
+        SurfacePoint point = make_point(particles, values, i, water ? bulk_of(&cells, cell) : 0.0f);
+        if (!water && fade < 1.0f)
+            surface->fading.points[surface->fading.count++] = point;
+        else if (!ocean || point.value > 0.0f || point.position[1] > calm_level)
+            surface->body.points[surface->body.count++] = point;
+        else
+            surface->body.points[particles->count - ++plain] = point;
     }
+    /* What is plain was stored from the end downwards. */
+    surface->rich_count = surface->body.count;
+    memmove(surface->body.points + surface->body.count, surface->body.points + (particles->count - plain),
+            (size_t)plain * sizeof(SurfacePoint));
+    surface->body.count += plain;
     if (water)
         return fill_droplets(surface, &cells, particles, err);
     return sort_far_first(surface, &scene->camera, err);

@@ -21,7 +21,8 @@ typedef struct SurfaceList {
 } SurfaceList;
 
 typedef struct Surface {
-    SurfaceList body;     /* seen from the eye, in the order of the input */
+    SurfaceList body;     /* seen from the eye; the order is fixed by that of the input */
+    uint32_t rich_count;  /* water: the first of them have foam, or are not plainly part of a calm ocean */
     SurfaceList droplets; /* of particles that fly alone (water) */
     SurfaceList fading;   /* fade < 1, farthest first (particles) */
     Buffer memory[10];

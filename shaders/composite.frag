@@ -2,6 +2,7 @@
 // the window's edge), and what one sees on it and through it. Colours are as displayed; the constants are tuned by eye.
 #include "frame.glsl"
 #include "sky.glsl"
+#include "behind.glsl"
 #include "ripples.glsl"
 uniform sampler2D mesh_image, mesh_depth_image, reflection_image, normal_image, thickness_image, edge_image;
 in vec2 uv;
@@ -42,23 +43,6 @@ Water find_water(vec3 ray, float mesh_there) {
     float at = ocean ? mix(min(still, depth + 5.0), depth, part) : part > 0.0 ? depth : NEVER;
     at = hole ? NEVER : at;
     return Water(at, eye.xyz + ray * min(at, 1e5), normalize(n), part);
-}
-
-// Sky, and the ground where there is one.
-vec3 backdrop(vec3 ray, vec3 direction, vec3 air) {
-    vec3 c = sky(direction);
-    if (edge.w > 0.0 && ray.y < -1e-4) {
-        float depth = (ground.x - eye.y) / ray.y;
-        if (depth > 0.0) {
-            float far = depth * length(ray), pixel = far * size.w * 2.0 * lens.y / max(-direction.y, 0.02);
-            vec2 p = (eye.xyz + ray * depth).xz + ground.yz;
-            vec2 d = abs(fract(p + 0.5) - 0.5);
-            vec2 on = (1.0 - smoothstep(vec2(0.006), vec2(0.006 + pixel), d)) * clamp(1.2 - pixel * 3.0, 0.0, 1.0);
-            vec3 floor_color = vec3(0.66, 0.68, 0.69) - 0.10 * max(on.x, on.y);
-            c = mix(floor_color, air, 1.0 - exp(-0.035 * far));
-        }
-    }
-    return c;
 }
 
 // What lies behind the surface, seen through the ripples: colour, and metres of water in between.
@@ -119,7 +103,7 @@ vec3 shade(Water water, vec3 direction, float ray_length, vec3 background, vec3 
     float broad = power_of_64(towards_sun), narrow = broad * broad;
     narrow *= narrow; // 256
     narrow *= narrow * narrow * narrow; // 1024
-    float glint = 2.4 * narrow + 0.20 * broad;
+    float glint = 1.8 * narrow + 0.20 * broad;
     vec2 bend = (mat3(view) * (n - vec3(0.0, max(n.y, 0.0), 0.0))).xy;
     vec4 mesh_mirrored = textureLod(reflection_image, uv + bend * vec2(0.16, 0.20) / max(1.0, 0.5 * far), 0.0);
     mirrored = mix(mirrored, mesh_mirrored.rgb, mesh_mirrored.a);
@@ -145,12 +129,6 @@ vec3 shade(Water water, vec3 direction, float ray_length, vec3 background, vec3 
     float light = 0.78 + 0.26 * max(dot(n, sun.xyz), 0.0);
     c = mix(c, vec3(0.93, 0.97, 1.0) * light, foam_cover(water.place.xz, slopes, foam, level));
     return ocean ? mix(c, air, 1.0 - exp(-0.0035 * max(far - 6.0, 0.0))) : c;
-}
-
-// Leaves all but the brightest as it is.
-vec3 display(vec3 c) {
-    vec3 over = max(c - 0.75, 0.0);
-    return min(c, vec3(0.75)) + 0.25 * (1.0 - exp(-4.0 * over));
 }
 
 void main() {
