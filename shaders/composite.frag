@@ -39,7 +39,10 @@ Water find_water(vec3 ray, float mesh_there) {
     bool hole = !covered && part * mesh_there > 0.5;
     part = covered ? part : 0.0;
     vec3 n = vec3(fluid.xy, sqrt(max(0.003, 1.0 - dot(fluid.xy, fluid.xy))));
-    n = mix(vec3(0.0, 1.0, 0.0), mat3(camera) * n, part);
+    n = mat3(camera) * n;
+    // At the edge of a crest before water far behind, the depth's slope is no slope of the sea's.
+    n.y = edge.z > 0.0 ? max(n.y, 0.45) : n.y;
+    n = mix(vec3(0.0, 1.0, 0.0), n, part);
     float at = ocean ? mix(min(still, depth + 5.0), depth, part) : part > 0.0 ? depth : NEVER;
     at = hole ? NEVER : at;
     return Water(at, eye.xyz + ray * min(at, 1e5), normalize(n), part);
@@ -127,6 +130,10 @@ vec3 shade(Water water, vec3 direction, float ray_length, vec3 background, vec3 
     vec3 clear = exp(-absorption * behind.a);
     vec3 c = mix(behind.rgb * clear + deep * (1.0 - clear), mirrored, mirror) + vec3(1.0, 0.88, 0.68) * glint;
     float light = 0.78 + 0.26 * max(dot(n, sun.xyz), 0.0);
+    // Sheets and drops in the air are full of small curved faces: brighter than what is behind them.
+    float airborne = ocean ? smoothstep(0.16, 0.26, water.place.y - eye.w) : 0.7;
+    float thin = airborne * water.fluid * (1.0 - smoothstep(0.12, 0.40, sums.r));
+    c = mix(c, vec3(0.80, 0.88, 0.92) * light, 0.5 * thin);
     c = mix(c, vec3(0.93, 0.97, 1.0) * light, foam_cover(water.place.xz, slopes, foam, level));
     return ocean ? mix(c, air, 1.0 - exp(-0.0035 * max(far - 6.0, 0.0))) : c;
 }
