@@ -1,5 +1,5 @@
 /* Smooths the water's depth: the narrow-range filter of [Truong & Yuksel 2018] along rows, then along
- * columns, then a 5 x 5 mean. The result is in IMAGE_DEPTH_WORK. */
+ * columns, then a local mean. The result is in IMAGE_DEPTH_WORK. */
 #include "pass.h"
 
 #include "shader.h"

@@ -36,18 +36,21 @@ static const PassType *const passes_in_order[] = {
 enum { COUNT = sizeof passes_in_order / sizeof passes_in_order[0] };
 _Static_assert((int)COUNT <= (int)FRAME_MAX_PASSES, "GfxStats and skip_passes have room for 32 passes");
 
-/* Sizes of the drawn sphere in spacings, so that one layer of particles closes. */
-#define SPHERE_IN_SPACINGS 1.0f
+/* Radius of the drawn sphere in spacings, so that one layer of particles closes. Over an ocean spheres are
+ * large, as it is smooth, and lowered, so that the surface lies half a spacing above the uppermost centres.
+ * In a tank they would stick out through the walls. */
+#define SPHERE_IN_OCEAN 1.0f
+#define SPHERE_IN_TANK  0.8f
 
 /* Layers of ripples: length of a tile in m, slope, direction in rad from +x, speed of its waves in m/s. Long
  * waves run faster; directions differ so that no two tiles coincide. */
 static const struct {
     float tile, slope, direction, speed;
 } ripple_layers[RIPPLE_LAYERS] = {
-    {19.0f, 0.11f, 0.45f, 1.9f},
-    {6.7f, 0.13f, 0.10f, 1.15f},
-    {2.9f, 0.13f, 0.85f, 0.70f},
-    {1.13f, 0.10f, 0.30f, 0.42f},
+    {19.0f, 0.09f, 0.45f, 1.9f},
+    {6.7f, 0.12f, 0.10f, 1.15f},
+    {2.9f, 0.14f, 0.85f, 0.70f},
+    {1.13f, 0.15f, 0.30f, 0.42f},
 };
 
 int frame_pass_count(void) {
@@ -146,9 +149,10 @@ static void fill_block(Frame *frame) {
         sqrtf(scene->sun[0] * scene->sun[0] + scene->sun[1] * scene->sun[1] + scene->sun[2] * scene->sun[2]);
     for (int k = 0; k < 3; k++)
         block->sun[k] = scene->sun[k] / length;
-    float spacing = scene->particles.spacing, radius = SPHERE_IN_SPACINGS * spacing;
+    bool ocean = scene->ocean.enabled;
+    float spacing = scene->particles.spacing, radius = (ocean ? SPHERE_IN_OCEAN : SPHERE_IN_TANK) * spacing;
     block->sphere[0] = radius;
-    block->sphere[1] = 1.0f - 0.5f * spacing / radius;
+    block->sphere[1] = ocean ? 1.0f - 0.5f * spacing / radius : 0.0f;
     block->sphere[3] = spacing;
     fill_edge(frame);
     block->ground[0] = scene->ground_level;

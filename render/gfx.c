@@ -70,7 +70,7 @@ GfxMaterial gfx_material_default(GfxMaterialKind kind) {
         [GFX_MATERIAL_PAINT] = {0.72f, 0.72f, 0.70f},
         [GFX_MATERIAL_HULL] = {0.86f, 0.87f, 0.86f},
         [GFX_MATERIAL_STONE] = {0.55f, 0.53f, 0.49f},
-        [GFX_MATERIAL_TANK] = {0.86f, 0.90f, 0.92f},
+        [GFX_MATERIAL_TANK] = {0.70f, 0.74f, 0.76f},
     };
     GfxMaterial material = {.kind = kind};
     memcpy(material.color, colors[kind], sizeof material.color);

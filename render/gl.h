@@ -58,6 +58,7 @@
     X(LINKPROGRAM, LinkProgram)                                                                              \
     X(PIXELSTOREI, PixelStorei)                                                                              \
     X(READPIXELS, ReadPixels)                                                                                \
+    X(SCISSOR, Scissor)                                                                                      \
     X(SHADERSOURCE, ShaderSource)                                                                            \
     X(TEXIMAGE2D, TexImage2D)                                                                                \
     X(TEXPARAMETERI, TexParameteri)                                                                          \

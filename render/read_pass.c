@@ -19,6 +19,12 @@ static void average_row(const uint8_t *rows, int row_width, int n, uint8_t *rgb,
         }
 }
 
+static void copy_row(const uint8_t *row, uint8_t *rgb, int width) {
+    for (int x = 0; x < width; x++)
+        for (int k = 0; k < 3; k++)
+            rgb[3 * x + k] = row[4 * x + k];
+}
+
 static bool draw(Pass *pass, Frame *frame, Err *err) {
     (void)err;
     const Gl *gl = frame->gl;
@@ -30,7 +36,10 @@ static bool draw(Pass *pass, Frame *frame, Err *err) {
         const uint8_t *rows =
             frame->pixels + 4 * (size_t)frame->width * (size_t)(frame->height - (y + 1) * n);
         uint8_t *rgb = frame->rgb + 3 * (size_t)frame->def.width * (size_t)y;
-        average_row(rows, frame->width, n, rgb, frame->def.width);
+        if (n == 1)
+            copy_row(rows, rgb, frame->def.width);
+        else
+            average_row(rows, frame->width, n, rgb, frame->def.width);
     }
     return true;
 }

@@ -17,7 +17,7 @@ enum {
     MAX_CELLS = 1 << 22,
     DEPTH_BINS = 4096,
     DROPLETS_EACH = 7,
-    ISOLATED_AT_MOST = 3, /* particles in 27 cells, itself included */
+    ALONE_AT_MOST = 4, /* particles in 3 x 3 x 3 fine cells, itself included */
 };
 enum {
     MEMORY_BODY,
@@ -25,14 +25,17 @@ enum {
     MEMORY_FADING,
     MEMORY_SORTED,
     MEMORY_CELLS,
+    MEMORY_FINE,
     MEMORY_COLUMNS,
     MEMORY_CELL_OF
 };
 
-/* A cell with less than this part of a full one is open. Spheres of half a spacing leave gaps, behind which a
- * third layer must stand; those of the water overlap. */
-#define OPEN_PART_WATER   0.25f
+/* A cell with less than this part of a full one is open. The smaller the spheres that are drawn, the more
+ * layers must stand behind their gaps. */
+#define OPEN_PART_OCEAN   0.25f
+#define OPEN_PART_TANK    0.45f
 #define OPEN_PART_SPHERES 0.60f
+#define CALM_HEIGHT       0.15f  /* m above still water; below it the sea has no bottom to be seen */
 #define SOLID_FADE        0.5f   /* what fades more than this hides nothing */
 #define DROPLET_SHOW      0.012f /* s of path shown by a droplet's stretch */
 #define WATER_PART        0.8f   /* mass of a particle / (rho0 d^3) */
@@ -41,8 +44,10 @@ typedef struct Cells {
     int size[3]; /* with a margin of one empty cell on every side */
     float origin[3], inv_edge;
     uint16_t *count;
+    uint8_t *fine;   /* the same for cells of half the edge */
     uint8_t *column; /* 1: some particle is above or below */
     int32_t *cell_of;
+    float full;     /* particles in a cell of water */
     int open_below; /* counts below this make a cell open */
 } Cells;
 
@@ -84,26 +89,37 @@ static bool make_cells(Cells *cells, Surface *surface, const GfxParticles *parti
     }
     cells->inv_edge = 1.0f / edge;
     float ratio = edge / particles->spacing;
-    float open = ceilf(open_part * ratio * ratio * ratio / WATER_PART);
+    cells->full = ratio * ratio * ratio / WATER_PART;
+    float open = ceilf(open_part * cells->full);
     cells->open_below = open > 60000.0f ? 60000 : (int)open;
     size_t count = (size_t)cells->size[0] * (size_t)cells->size[1] * (size_t)cells->size[2];
     size_t columns = (size_t)cells->size[0] * (size_t)cells->size[2];
     Buffer *memory = surface->memory;
     if (!buffer_reserve(&memory[MEMORY_CELLS], "surface cells", count * sizeof *cells->count, err) ||
+        !buffer_reserve(&memory[MEMORY_FINE], "surface cells", 8 * count, err) ||
         !buffer_reserve(&memory[MEMORY_COLUMNS], "surface columns", columns, err) ||
         !buffer_reserve(&memory[MEMORY_CELL_OF], "surface particles",
                         particles->count * sizeof *cells->cell_of, err))
         return false;
     cells->count = memory[MEMORY_CELLS].data;
+    cells->fine = memory[MEMORY_FINE].data;
     cells->column = memory[MEMORY_COLUMNS].data;
     cells->cell_of = memory[MEMORY_CELL_OF].data;
     memset(cells->count, 0, count * sizeof *cells->count);
+    memset(cells->fine, 0, 8 * count);
     memset(cells->column, 0, columns);
     return true;
 }
 
 static int cell_coordinate(const Cells *cells, float x, int k) {
     return (int)((x - cells->origin[k]) * cells->inv_edge);
+}
+
+static size_t fine_cell(const Cells *cells, const float p[3]) {
+    size_t f[3];
+    for (int k = 0; k < 3; k++)
+        f[k] = (size_t)((p[k] - cells->origin[k]) * (2.0f * cells->inv_edge));
+    return (f[2] * 2 * (size_t)cells->size[0] + f[0]) * 2 * (size_t)cells->size[1] + f[1];
 }
 
 /* y runs fastest, so that columns are contiguous. */
@@ -114,7 +130,9 @@ static void count_particles(Cells *cells, const GfxParticles *particles) {
         int column = cell_coordinate(cells, p[2], 2) * cells->size[0] + x;
         int cell = column * cells->size[1] + y;
         cells->cell_of[i] = cell;
+        uint8_t *fine = &cells->fine[fine_cell(cells, p)];
         cells->column[column] = 1;
+        *fine += *fine < UINT8_MAX;
         if (fade_of(particles, i) >= SOLID_FADE && cells->count[cell] < UINT16_MAX)
             cells->count[cell]++;
     }
@@ -140,13 +158,15 @@ static bool is_outer(const Cells *cells, int cell, const int eye[3], bool ocean)
     return false;
 }
 
-static bool is_alone(const Cells *cells, int cell) {
+static bool is_alone(const Cells *cells, const float p[3]) {
+    size_t along_x = 2 * (size_t)cells->size[1], along_z = 2 * (size_t)cells->size[0] * along_x;
+    const uint8_t *corner = &cells->fine[fine_cell(cells, p) - along_z - along_x - 1];
     int total = 0;
-    for (int dz = -1; dz <= 1; dz++)
-        for (int dx = -1; dx <= 1; dx++)
-            for (int dy = -1; dy <= 1; dy++)
-                total += cells->count[cell + (dz * cells->size[0] + dx) * cells->size[1] + dy];
-    return total <= ISOLATED_AT_MOST;
+    for (size_t z = 0; z < 3; z++)
+        for (size_t x = 0; x < 3; x++)
+            for (size_t y = 0; y < 3; y++)
+                total += corner[z * along_z + x * along_x + y];
+    return total <= ALONE_AT_MOST;
 }
 
 /* ---- Droplets ---- */
@@ -238,20 +258,35 @@ static bool fill_droplets(Surface *surface, const Cells *cells, const GfxParticl
     return true;
 }
 
-static SurfacePoint make_point(const GfxParticles *particles, const float *values, uint32_t i, float fade) {
+/* How much the 27 cells around are filled: a quarter is a sheet, half the surface of a body of water. */
+static float bulk_of(const Cells *cells, int cell) {
+    int total = 0;
+    for (int z = -1; z <= 1; z++)
+        for (int x = -1; x <= 1; x++)
+            for (int y = -1; y <= 1; y++)
+                total += cells->count[cell + (z * cells->size[0] + x) * cells->size[1] + y];
+    float part = ((float)total / (27.0f * cells->full) - 0.20f) / 0.20f;
+    return part < 0.0f ? 0.0f : part > 1.0f ? 1.0f : part;
+}
+
+static SurfacePoint make_point(const GfxParticles *particles, const float *values, uint32_t i, float bulk) {
     const float *p = particles->position[i];
-    return (SurfacePoint){{p[0], p[1], p[2]}, fade, values ? values[i] : 0.0f};
+    return (SurfacePoint){{p[0], p[1], p[2]}, fade_of(particles, i), values ? values[i] : 0.0f, bulk};
 }
 
 bool surface_select(Surface *surface, const GfxScene *scene, GfxLook look, Err *err) {
     const GfxParticles *particles = &scene->particles;
     bool water = look == GFX_LOOK_WATER;
+    bool ocean = water && scene->ocean.enabled;
+    float open_part = ocean ? OPEN_PART_OCEAN : water ? OPEN_PART_TANK : OPEN_PART_SPHERES;
+    float calm_level = scene->ocean.level + CALM_HEIGHT;
+    uint32_t plain = 0;
     Cells cells;
     if (!reserve_lists(surface, particles->count, err))
         return false;
     if (particles->count == 0)
         return true;
-    if (!make_cells(&cells, surface, particles, water ? OPEN_PART_WATER : OPEN_PART_SPHERES, err))
+    if (!make_cells(&cells, surface, particles, open_part, err))
         return false;
     count_particles(&cells, particles);
     int eye[3];
@@ -263,15 +298,25 @@ bool surface_select(Surface *surface, const GfxScene *scene, GfxLook look, Err *
     for (uint32_t i = 0; i < particles->count; i++) {
         float fade = fade_of(particles, i);
         int cell = cells.cell_of[i];
-        if (!(fade > 0.0f) || !is_outer(&cells, cell, eye, water && scene->ocean.enabled))
+        if (!(fade > 0.0f) || !is_outer(&cells, cell, eye, ocean))
             continue;
-        if (water && is_alone(&cells, cell)) {
+        if (water && is_alone(&cells, particles->position[i])) {
             cells.cell_of[i] = -1;
             continue;
         }
-        SurfaceList *list = !water && fade < 1.0f ? &surface->fading : &surface->body;
-        list->points[list->count++] = make_point(particles, values, i, fade);
+        SurfacePoint point = make_point(particles, values, i, water ? bulk_of(&cells, cell) : 0.0f);
+        if (!water && fade < 1.0f)
+            surface->fading.points[surface->fading.count++] = point;
+        else if (!ocean || point.value > 0.0f || point.position[1] > calm_level)
+            surface->body.points[surface->body.count++] = point;
+        else
+            surface->body.points[particles->count - ++plain] = point;
     }
+    /* What is plain was stored from the end downwards. */
+    surface->rich_count = surface->body.count;
+    memmove(surface->body.points + surface->body.count, surface->body.points + (particles->count - plain),
+            (size_t)plain * sizeof(SurfacePoint));
+    surface->body.count += plain;
     if (water)
         return fill_droplets(surface, &cells, particles, err);
     return sort_far_first(surface, &scene->camera, err);

@@ -12,6 +12,7 @@ typedef struct SurfacePoint {
     float position[3]; /* local, m */
     float fade;        /* 0..1; droplets: opacity */
     float value;       /* body: foam or field; droplets: radius, m */
+    float bulk;        /* body of water: 0 in a thin sheet .. 1 */
 } SurfacePoint;
 
 typedef struct SurfaceList {
@@ -20,10 +21,11 @@ typedef struct SurfaceList {
 } SurfaceList;
 
 typedef struct Surface {
-    SurfaceList body;     /* seen from the eye, in the order of the input */
+    SurfaceList body;     /* seen from the eye; the order is fixed by that of the input */
+    uint32_t rich_count;  /* water: the first of them have foam, or are not plainly part of a calm ocean */
     SurfaceList droplets; /* of particles that fly alone (water) */
     SurfaceList fading;   /* fade < 1, farthest first (particles) */
-    Buffer memory[8];
+    Buffer memory[10];
 } Surface;
 
 /* Fills the lists; memory is reused from call to call. ERR_USAGE: a particle is not finite (its index);

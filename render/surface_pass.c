@@ -8,11 +8,13 @@ static void create_points(const Gl *gl, PointBuffer *points) {
     gl->GenBuffers(1, &points->buffer);
     gl->BindVertexArray(points->vertex_array);
     gl->BindBuffer(GL_ARRAY_BUFFER, points->buffer);
-    gl->EnableVertexAttribArray(0);
-    gl->EnableVertexAttribArray(1);
+    for (GLuint i = 0; i < 3; i++)
+        gl->EnableVertexAttribArray(i);
     gl->VertexAttribPointer(0, 4, GL_FLOAT, GL_FALSE, sizeof(SurfacePoint), NULL);
     gl->VertexAttribPointer(1, 1, GL_FLOAT, GL_FALSE, sizeof(SurfacePoint),
                             (void *)offsetof(SurfacePoint, value));
+    gl->VertexAttribPointer(2, 1, GL_FLOAT, GL_FALSE, sizeof(SurfacePoint),
+                            (void *)offsetof(SurfacePoint, bulk));
 }
 
 static bool create(Pass *pass, Frame *frame, Err *err) {

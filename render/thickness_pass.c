@@ -26,7 +26,7 @@ static bool draw(Pass *pass, Frame *frame, Err *err) {
     gl->Enable(GL_BLEND);
     gl->BlendFunc(GL_ONE, GL_ONE);
     gl->BindVertexArray(frame->body.vertex_array);
-    gl->DrawArrays(GL_POINTS, 0, frame->body.count);
+    gl->DrawArrays(GL_POINTS, 0, (GLsizei)frame->surface.rich_count);
     return true;
 }
 

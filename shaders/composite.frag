@@ -2,6 +2,7 @@
 // the window's edge), and what one sees on it and through it. Colours are as displayed; the constants are tuned by eye.
 #include "frame.glsl"
 #include "sky.glsl"
+#include "behind.glsl"
 #include "ripples.glsl"
 uniform sampler2D mesh_image, mesh_depth_image, reflection_image, normal_image, thickness_image, edge_image;
 in vec2 uv;
@@ -38,27 +39,13 @@ Water find_water(vec3 ray, float mesh_there) {
     bool hole = !covered && part * mesh_there > 0.5;
     part = covered ? part : 0.0;
     vec3 n = vec3(fluid.xy, sqrt(max(0.003, 1.0 - dot(fluid.xy, fluid.xy))));
-    n = mix(vec3(0.0, 1.0, 0.0), mat3(camera) * n, part);
+    n = mat3(camera) * n;
+    // At the edge of a crest before water far behind, the depth's slope is no slope of the sea's.
+    n.y = edge.z > 0.0 ? max(n.y, 0.45) : n.y;
+    n = mix(vec3(0.0, 1.0, 0.0), n, part);
     float at = ocean ? mix(min(still, depth + 5.0), depth, part) : part > 0.0 ? depth : NEVER;
     at = hole ? NEVER : at;
     return Water(at, eye.xyz + ray * min(at, 1e5), normalize(n), part);
-}
-
-// Sky, and the ground where there is one.
-vec3 backdrop(vec3 ray, vec3 direction, vec3 air) {
-    vec3 c = sky(direction);
-    if (edge.w > 0.0 && ray.y < -1e-4) {
-        float depth = (ground.x - eye.y) / ray.y;
-        if (depth > 0.0) {
-            float far = depth * length(ray), pixel = far * size.w * 2.0 * lens.y / max(-direction.y, 0.02);
-            vec2 p = (eye.xyz + ray * depth).xz + ground.yz;
-            vec2 d = abs(fract(p + 0.5) - 0.5);
-            vec2 on = (1.0 - smoothstep(vec2(0.006), vec2(0.006 + pixel), d)) * clamp(1.2 - pixel * 3.0, 0.0, 1.0);
-            vec3 floor_color = vec3(0.66, 0.68, 0.69) - 0.10 * max(on.x, on.y);
-            c = mix(floor_color, air, 1.0 - exp(-0.035 * far));
-        }
-    }
-    return c;
 }
 
 // What lies behind the surface, seen through the ripples: colour, and metres of water in between.
@@ -66,15 +53,16 @@ vec4 see_through(Water water, float ray_length, vec2 bend, float thickness, vec3
     float own_depth = texelFetch(mesh_depth_image, ivec2(gl_FragCoord.xy), 0).r;
     vec2 at = uv + bend * 0.035;
     float buffer = textureLod(mesh_depth_image, at, 0.0).r;
-    if (mesh_depth(buffer) <= water.depth) { // that one stands in front of the water
+    bool in_front = mesh_depth(buffer) <= water.depth, gone = buffer == 1.0 && own_depth < 1.0;
+    if (in_front || gone) { // of the water; past the edge of what stands behind
         at = uv;
         buffer = own_depth;
     }
     bool mesh_behind = buffer < 1.0;
     float under = mesh_behind ? max(mesh_depth(buffer) - water.depth, 0.0) * ray_length : edge.z > 0.0 ? 8.0 : 3.0;
-    // In the air only what is thick is a body of water; the rest are sheets.
+    // In the air only what is thick is a body of water; the rest are sheets. (Particles inside a body count as much more.)
     if (edge.z == 0.0 || water.place.y > eye.w + 0.25)
-        under = mix(min(under, thickness), under, smoothstep(0.18, 0.40, thickness));
+        under = mix(min(under, thickness), under, smoothstep(0.12, 0.40, thickness));
     return vec4(mesh_behind ? textureLod(mesh_image, at, 0.0).rgb : empty, under);
 }
 
@@ -118,18 +106,18 @@ vec3 shade(Water water, vec3 direction, float ray_length, vec3 background, vec3 
     float broad = power_of_64(towards_sun), narrow = broad * broad;
     narrow *= narrow; // 256
     narrow *= narrow * narrow * narrow; // 1024
-    float glint = 2.4 * narrow + 0.20 * broad;
-    vec2 bend = (mat3(view) * (n - vec3(0.0, 1.0, 0.0))).xy;
+    float glint = 1.8 * narrow + 0.20 * broad;
+    vec2 bend = (mat3(view) * (n - vec3(0.0, max(n.y, 0.0), 0.0))).xy;
     vec4 mesh_mirrored = textureLod(reflection_image, uv + bend * vec2(0.16, 0.20) / max(1.0, 0.5 * far), 0.0);
     mirrored = mix(mirrored, mesh_mirrored.rgb, mesh_mirrored.a);
     glint *= 1.0 - mesh_mirrored.a;
 
     vec2 sums = textureLod(thickness_image, uv, 0.0).rg;
     bool ocean = edge.z > 0.0;
-    vec3 deep = ocean ? vec3(0.010, 0.135, 0.200) : vec3(0.02, 0.30, 0.38);
+    vec3 deep = ocean ? vec3(0.010, 0.135, 0.200) : vec3(0.03, 0.26, 0.33);
     // Faces turned to the sun let more light in.
-    deep *= 1.0 + 1.3 * dot(n.xz, sun.xz);
-    vec3 absorption = ocean ? vec3(3.2, 1.05, 0.75) : vec3(1.5, 0.38, 0.22);
+    deep *= max(1.0 + 1.3 * dot(n.xz, sun.xz), 0.6);
+    vec3 absorption = ocean ? vec3(3.2, 1.05, 0.75) : vec3(0.95, 0.24, 0.15);
     // Light through thin crests and steep faces.
     float crest = clamp((water.place.y - eye.w) * 4.0 + 0.10, 0.0, 1.0) * water.fluid;
     float through = 0.5 - 0.5 * dot(direction, sun.xyz);
@@ -142,14 +130,12 @@ vec3 shade(Water water, vec3 direction, float ray_length, vec3 background, vec3 
     vec3 clear = exp(-absorption * behind.a);
     vec3 c = mix(behind.rgb * clear + deep * (1.0 - clear), mirrored, mirror) + vec3(1.0, 0.88, 0.68) * glint;
     float light = 0.78 + 0.26 * max(dot(n, sun.xyz), 0.0);
+    // Sheets and drops in the air are full of small curved faces: brighter than what is behind them.
+    float airborne = ocean ? smoothstep(0.16, 0.26, water.place.y - eye.w) : 0.7;
+    float thin = airborne * water.fluid * (1.0 - smoothstep(0.12, 0.40, sums.r));
+    c = mix(c, vec3(0.80, 0.88, 0.92) * light, 0.5 * thin);
     c = mix(c, vec3(0.93, 0.97, 1.0) * light, foam_cover(water.place.xz, slopes, foam, level));
     return ocean ? mix(c, air, 1.0 - exp(-0.0035 * max(far - 6.0, 0.0))) : c;
-}
-
-// Leaves all but the brightest as it is.
-vec3 display(vec3 c) {
-    vec3 over = max(c - 0.75, 0.0);
-    return min(c, vec3(0.75)) + 0.25 * (1.0 - exp(-4.0 * over));
 }
 
 void main() {

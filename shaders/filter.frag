@@ -8,7 +8,7 @@ uniform float reach;     // of the filter, px at depth 1 m
 uniform float threshold; // m
 layout(location = 0) out float residual;
 
-const int TAPS = 15;
+const int TAPS = 12;
 
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy), last = ivec2(fluid_size.xy) - 1;
@@ -24,7 +24,7 @@ void main() {
     // Large kernels take fewer taps at a stride: what they smooth is then as large.
     float wanted = reach / max(centre + still, lens.z);
     int taps = int(clamp(ceil(wanted), 1.0, float(TAPS)));
-    float stride = clamp(wanted / float(TAPS), 1.0, 4.0);
+    float stride = clamp(wanted / float(TAPS), 1.0, 5.0);
     float falloff = 4.5 / float(taps * taps);
     vec2 sum = vec2(centre, 0.0), weights = vec2(1.0, 0.0);
     vec2 upper = vec2(centre + range), lower = vec2(centre - range);

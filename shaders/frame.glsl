@@ -17,10 +17,12 @@ vec3 local_ray(vec2 uv) {
     return mat3(camera) * eye_ray(uv);
 }
 
-// Depth at which a local ray meets still water; the farthest that counts where it does not.
+// Depth at which a local ray meets still water, the reference of the fluid's depth; the farthest that counts where it does
+// not. In a tank, which is looked at from all sides, the reference is the eye.
 float plane_depth(vec3 ray) {
     float depth = abs(ray.y) > 1e-4 ? (eye.w - eye.y) / ray.y : sun.w;
-    return depth > 0.0 ? min(depth, sun.w) : sun.w;
+    depth = depth > 0.0 ? min(depth, sun.w) : sun.w;
+    return edge.z > 0.0 ? depth : 0.0;
 }
 
 // Eye depth of a depth buffer's value.

@@ -81,6 +81,8 @@ vec4 tiles(vec3 n) {
 void main() {
     if (mirror < 0.0 && place.y < eye.w - 0.03)
         discard;
+    if (material == TANK && normal.y > 0.9)
+        discard; // a lid is of glass
     vec3 n = normalize(normal) * (material == TANK ? -1.0 : 1.0);
     vec4 surface = vec4(has_colors == 1 ? own_color : paint.rgb, 0.3);
     if (material == HULL)
@@ -90,7 +92,8 @@ void main() {
     else if (material == TANK)
         surface = tiles(n);
     vec3 to_eye = normalize(eye.xyz - place);
-    float lit = max(dot(n, sun.xyz), 0.0);
+    // Light falls into a container through all its walls.
+    float lit = material == TANK ? 0.45 + 0.35 * dot(n, sun.xyz) : max(dot(n, sun.xyz), 0.0);
     vec3 ambient = mix(vec3(0.24, 0.34, 0.40), vec3(0.56, 0.66, 0.78), n.y * 0.5 + 0.5);
     vec3 c = surface.rgb * (ambient * 1.04 + vec3(1.0, 0.93, 0.82) * lit * 0.95);
     float facing = 1.0 - max(dot(n, to_eye), 0.0), f = facing * facing;

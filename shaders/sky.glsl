@@ -12,5 +12,5 @@ vec3 sky(vec3 direction) {
 
 // Colour of the air at the horizon, where everything ends.
 vec3 haze(vec3 direction) {
-    return sky(vec3(direction.x, 0.02, direction.z));
+    return sky(vec3(direction.x, 0.0, direction.z));
 }

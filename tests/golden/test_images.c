@@ -127,9 +127,11 @@ static double compare_with_stored(const Pictures *pictures, const char **worst) 
         Err err = {0};
         char path[512];
         snprintf(path, sizeof path, "%s/tests/golden/images/%s.png", SKIFF_SOURCE_DIR, pictures->names[i]);
-        if (!gfx_png_read(path, stored, WIDTH, HEIGHT, &err))
-            fail_msg("%s", err.message);
-        double rms = difference_rms(pictures->rgb[i], stored);
+        double rms = 256.0; /* a picture that is not known at all is as far off as can be */
+        if (gfx_png_read(path, stored, WIDTH, HEIGHT, &err))
+            rms = difference_rms(pictures->rgb[i], stored);
+        else
+            print_message("%s\n", err.message);
         if (rms > largest) {
             largest = rms;
             *worst = pictures->names[i];
