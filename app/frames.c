@@ -140,10 +140,10 @@ static void copy_particles(Frame *frame, const SkiffParticles *particles, float 
 
 static void copy_ghosts(Frame *frame, const Ghosts *ghosts) {
     for (uint32_t g = 0; g < ghosts->count; g++) {
-        uint32_t i = frame->count;
+        uint32_t i = frame->count++;
+        /* Negative: it was removed between the frame's time and the end of the step, and is still all there.
+         */
         float gone = (float)(frame->time - ghosts->removed[g]);
-        if (gone < 0)
-            continue; /* still alive at the frame's time, gone at the end of the step: `live` has lost it */
         for (int k = 0; k < 3; k++) {
             frame->velocity[i][k] = ghosts->velocity[g][k];
             frame->position[i][k] = ghosts->position[g][k] + gone * ghosts->velocity[g][k];
@@ -152,8 +152,7 @@ static void copy_ghosts(Frame *frame, const Ghosts *ghosts) {
         frame->density[i] = frame->pressure[i] = 0;
         frame->id[i] = ghosts->id[g];
         frame->birth[i] = ghosts->birth[g];
-        frame->gone[i] = gone;
-        frame->count++;
+        frame->gone[i] = fmaxf(0, gone);
     }
 }
 
