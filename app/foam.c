@@ -67,8 +67,10 @@ void foam_destroy(Foam *foam) {
 
 /* ---- Amounts by id ---- */
 
+/* Neighbours in the water mostly have neighbouring ids: groups of 32 stay together, which halves the time. */
 static size_t place_of(const Table *table, uint64_t key) {
-    size_t place = (size_t)(key * 0x9E3779B97F4A7C15u >> 20) & table->mask;
+    uint64_t group = (key >> 5) * 0x9E3779B97F4A7C15u >> 20;
+    size_t place = (size_t)(group << 5 | (key & 31)) & table->mask;
     while (table->entries[place].key != 0 && table->entries[place].key != key)
         place = (place + 1) & table->mask;
     return place;

@@ -1,6 +1,6 @@
 /* Three groups on dark translucent plates: time and counts (top left), speed, throttle and rudder (bottom
- * left), pressed keys (bottom right). Drawn on the CPU after the picture has been read back: 0.2 ms at 720p,
- * and the same pixels whatever draws the scene.
+ * left), pressed keys (bottom right). Drawn on the CPU after the picture has been read back: about 1 ms at
+ * 720p, and the same pixels whatever draws the scene.
  *
  * Shapes are rounded boxes; a pixel's coverage is taken from the signed distance of its centre. Lengths below
  * are px at a height of 720. */
