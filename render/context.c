@@ -199,9 +199,7 @@ static bool osmesa_make_current(Context *context) {
                                         OSMESA_EDGE, OSMESA_EDGE);
 }
 
-/* Without a context that is current before, OSMesa leaks the last one's buffers. */
 static void osmesa_close(Context *context) {
-    context->osmesa.make_current(NULL, NULL, GL_UNSIGNED_BYTE, 0, 0);
     context->osmesa.destroy(context->osmesa_context);
 }
 
