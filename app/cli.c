@@ -5,6 +5,8 @@
 #include "commands.h"
 #include "nearest.h"
 #include "problems.h"
+#include "scene_table.h"
+#include "view_options.h"
 #include "version.h"
 
 #include <errno.h>
@@ -22,6 +24,7 @@ typedef enum OptionType {
     OPTION_NUMBER,
     OPTION_INTEGER,
     OPTION_CHOICE,
+    OPTION_VECTOR,
     OPTION_EDIT
 } OptionType;
 
@@ -37,7 +40,9 @@ typedef struct Option {
 } Option;
 
 typedef struct Command {
-    const char *name;
+    const char *name;    /* one or two words */
+    const char *operand; /* what its argument is called; NULL: it takes none */
+    bool needs_operand;
     const char *arguments;
     const char *summary;
     const char *details;
@@ -69,6 +74,67 @@ typedef struct Command {
 #define OPTION_ROW_HELP                                                                                      \
     { 'h', "help", NULL, OPTION_FLAG, AT(help), .help = "Show this help" }
 
+/* Of pictures; words in the order of the enumerations. */
+#define PICTURE(member) .offset = offsetof(CliArgs, pictures.member)
+#define OPTION_ROW_GL                                                                                        \
+    {                                                                                                        \
+        0, "gl", "WAY", OPTION_CHOICE, PICTURE(gl),                                                          \
+            .names = VIEW_BACKENDS,                                                                          \
+            .help = "How OpenGL is reached without a screen: " VIEW_BACKENDS " (default auto: the first "    \
+                    "that works)"                                                                            \
+    }
+#define OPTION_ROWS_PICTURES                                                                                 \
+    {                                                                                                        \
+        0,           "video",        NULL,                                                                   \
+        OPTION_FLAG, PICTURE(video), .help = "Film the frames: video.mp4 (H.264), by ffmpeg"},               \
+        {0, "size", "WxH", OPTION_TEXT, PICTURE(size), .help = "Size of a frame, px (default 1280x720)"},    \
+        {0,                                                                                                  \
+         "supersample",                                                                                      \
+         "N",                                                                                                \
+         OPTION_INTEGER,                                                                                     \
+         PICTURE(supersample),                                                                               \
+         .min = 1,                                                                                           \
+         .max = 4,                                                                                           \
+         .help = "Draw N times larger, then average; for stills"},                                           \
+        {0,                                                                                                  \
+         "look",                                                                                             \
+         "LOOK",                                                                                             \
+         OPTION_CHOICE,                                                                                      \
+         PICTURE(look),                                                                                      \
+         .names = RENDER_LOOKS,                                                                              \
+         .help = RENDER_LOOKS ": a surface, or spheres coloured by a field"},                                \
+        {0,                                                                                                  \
+         "field",                                                                                            \
+         "FIELD",                                                                                            \
+         OPTION_CHOICE,                                                                                      \
+         PICTURE(field),                                                                                     \
+         .names = RENDER_FIELDS,                                                                             \
+         .help = "Colour of the look particles: " RENDER_FIELDS},                                            \
+        {0,                                                                                                  \
+         "camera",                                                                                           \
+         "NAME",                                                                                             \
+         OPTION_TEXT,                                                                                        \
+         PICTURE(camera),                                                                                    \
+         .help = "One of the scene's cameras, or chase, fixed, orbit, top, bow; cuts of the input script "   \
+                 "are not followed then"},                                                                   \
+        {0,                                                                                                  \
+         "hud",                                                                                              \
+         "WHICH",                                                                                            \
+         OPTION_CHOICE,                                                                                      \
+         PICTURE(hud),                                                                                       \
+         .names = RENDER_HUDS,                                                                               \
+         .help = "Figures in the picture: " RENDER_HUDS "; timing adds the wall time of a step, which "      \
+                 "makes the frames of two runs differ"},                                                     \
+        {0,                                                                                                  \
+         "fade",                                                                                             \
+         "WHICH",                                                                                            \
+         OPTION_CHOICE,                                                                                      \
+         PICTURE(fade),                                                                                      \
+         .names = "off|on",                                                                                  \
+         .help = "on (default): created and removed particles fade; off: they pop"},                         \
+        {0, "frames", "A:B", OPTION_TEXT, PICTURE(frames), .help = "Draw only frames A to B, from 1"},       \
+        OPTION_ROW_GL
+
 static const Option run_options[] = {
     {'o', "output", "DIR", OPTION_TEXT, AT(output), .help = "Folder for the results, created; required"},
     {'d', "duration", "S", OPTION_NUMBER, AT(duration), .min = 1e-6, .max = 1e6,
@@ -79,6 +145,15 @@ static const Option run_options[] = {
     {'r', "resume", NULL, OPTION_FLAG, AT(resume), .help = "Go on from the folder's last checkpoint"},
     {0, "checkpoint-every", "S", OPTION_NUMBER, AT(checkpoint_every), .min = 0, .max = 1e9,
      .help = "Wall-clock seconds between checkpoints (default 120; 0: after every step)"},
+    {0, "render", NULL, OPTION_FLAG, PICTURE(render),
+     .help = "Draw frames/frame_000001.png ... (default when the scene has a section \"Render\", or when one "
+             "of the options below is given)"},
+    {0, "no-render", NULL, OPTION_FLAG, PICTURE(no_render), .help = "Draw none; needs no OpenGL"},
+    {0, "fps", "N", OPTION_INTEGER, PICTURE(fps), .min = 1, .max = 1000,
+     .help = "Frames a simulated second (default 30); the step need not fit"},
+    OPTION_ROWS_PICTURES,
+    {0, "save-particles", "FPS", OPTION_INTEGER, PICTURE(save_particles), .min = 1, .max = 1000,
+     .help = "Save particles/ as often, 52 bytes a particle, for `skiff render` and export"},
     {'q', "quiet", NULL, OPTION_FLAG, AT(quiet), .help = "No progress on stderr"},
     OPTION_ROW_HELP,
 };
@@ -108,18 +183,66 @@ static const Option bench_options[] = {
     OPTION_ROW_HELP,
 };
 
+#define OPTION_ROW_JSON                                                                                      \
+    { 0, "json", NULL, OPTION_FLAG, AT(json), .help = "One line of JSON in place of the table" }
+
+static const Option rest_make_options[] = {
+    {'o', "output", "FILE", OPTION_TEXT, AT(output), .help = "Write the tile (default: measure it only)"},
+    {0, "edge", "N", OPTION_NUMBER, AT(edge), .min = 6, .max = 64,
+     .help = "Edge in particle diameters (default 12: 2171 points)"},
+    {0, "seed", "S", OPTION_INTEGER, AT(seed), .min = 0, .max = 2147483647,
+     .help = "Which of the arrangements (default 1, the one that comes with the program)"},
+    {0, "threads", "N", OPTION_INTEGER, AT(threads), .min = 1, .max = 1024,
+     .help = "Threads (default: one for each core). The result does not depend on it"},
+    OPTION_ROW_JSON,
+    OPTION_ROW_HELP,
+};
+
+static const Option rest_cut_options[] = {
+    {'o', "output", "FILE", OPTION_TEXT, AT(output), .help = "Write the block; required"},
+    {0, "min", "X,Y,Z", OPTION_VECTOR, AT(min),
+     .help = "Lower corner of the box to cut, m (default: two support radii inside the outermost particles)"},
+    {0, "max", "X,Y,Z", OPTION_VECTOR, AT(max), .help = "Upper corner, m"},
+    OPTION_ROW_JSON,
+    OPTION_ROW_HELP,
+};
+
+static const Option rest_show_options[] = {
+    OPTION_ROW_JSON,
+    OPTION_ROW_HELP,
+};
+
+static const Option render_options[] = {
+    {'o', "output", "OUT", OPTION_TEXT, AT(output),
+     .help = "Folder for the results (default DIR/redrawn, or DIR/export)"},
+    {'f', "force", NULL, OPTION_FLAG, AT(force), .help = "Replace the results in an existing folder"},
+    OPTION_ROWS_PICTURES,
+    {0, "export", "FORMAT", OPTION_CHOICE, PICTURE(export), .names = VIEW_EXPORTS,
+     .help = "Convert the particles instead of drawing them: vtk (.vtu: ParaView, Blender), ply, bgeo "
+             "(Houdini)"},
+    {'q', "quiet", NULL, OPTION_FLAG, AT(quiet), .help = "No progress on stderr"},
+    OPTION_ROW_HELP,
+};
+
+static const Option gl_info_options[] = {
+    OPTION_ROW_GL,
+    OPTION_ROW_HELP,
+};
+
 static const Command commands[] = {
-    {"run", "SCENE -o DIR", "Simulate a scene and write its results into a folder",
+    {"run", "scene", true, "SCENE -o DIR", "Simulate a scene and write its results into a folder",
      "The folder receives report.html (charts; open it in a browser), summary.json, steps.csv, hull.csv "
      "(bodies),\n"
-     "probes.csv, scene.json (the scene with every default filled in) and state.skiff (checkpoint).\n"
+     "probes.csv, scene.json (the scene with every default filled in) and state.skiff (checkpoint); with\n"
+     "pictures also frames/ and video.mp4.\n"
      "Ctrl-C finishes the step, writes a checkpoint and the report, and exits with 130; --resume goes on "
      "from there.\n",
      "  skiff run assets/scenes/settling-tank.json -o out/tank\n"
      "  skiff run assets/scenes/dam-body.json -o out/dam --duration 2 --set RigidBodies[0].density=300\n"
-     "  skiff run assets/scenes/dam-body.json -o out/dam --resume --duration 4\n",
+     "  skiff run assets/scenes/dam-body.json -o out/dam --resume --duration 4\n"
+     "  skiff run assets/scenes/dam-body.json -o out/film --video --size 960x540 --camera orbit\n",
      run_options, COUNT(run_options), run_command},
-    {"check", "SCENE", "Check a scene and show what it means",
+    {"check", "scene", true, "SCENE", "Check a scene and show what it means",
      "Reports every problem of the file, with its place, the values allowed and the nearest name. A good\n"
      "scene is printed to stdout as JSON with every default filled in; counts, bodies and memory follow on\n"
      "stderr. Writes no file.\n",
@@ -127,13 +250,48 @@ static const Command commands[] = {
      "  skiff check scene.json --set particleRadius=0.02 > effective.json\n"
      "  skiff check --schema > scene.schema.json\n",
      check_options, COUNT(check_options), check_command},
-    {"bench", "SCENE", "Measure the time of a step",
+    {"bench", "scene", true, "SCENE", "Measure the time of a step",
      "Lets the scene settle, then times windows of steps and prints the median over the windows: ms for\n"
      "each phase, iterations, particles a second, and the errors reached. Appends a row to the scene's CSV\n"
      "file of results.\n",
      "  skiff bench assets/scenes/bench-tank.json\n"
      "  skiff bench assets/scenes/bench-dam.json --settle 0 --steps 95 --windows 7 --json\n",
      bench_options, COUNT(bench_options), bench_command},
+    {"rest make", NULL, false, "[-o FILE]", "Make a tile of water at rest, which shapes are filled from",
+     "Relaxes random points of a periodic cube until every density is rest density and the pressures of "
+     "still\n"
+     "water push no point, and prints how well that went. Lengths in the file are in particle radii, so that "
+     "one\n"
+     "file serves every resolution. The tile made by the defaults is part of the program.\n",
+     "  skiff rest make\n"
+     "  skiff rest make --edge 16 --seed 7 -o tile.skiff\n",
+     rest_make_options, COUNT(rest_make_options), rest_make_command},
+    {"rest cut", "folder", true, "DIR -o FILE", "Cut a block of water at rest out of a finished run",
+     "Takes the particles of a box out of the last state of a run, a tank that has settled, and prints how "
+     "much\n"
+     "they are at rest. Other than a tile, a block ends at its faces: it fills no more than its own size.\n",
+     "  skiff run assets/scenes/settling-tank.json -o out/tank\n"
+     "  skiff rest cut out/tank -o block.skiff\n"
+     "  skiff rest cut out/tank --min -0.5,0.2,-0.5 --max 0.5,0.8,0.5 -o block.skiff\n",
+     rest_cut_options, COUNT(rest_cut_options), rest_cut_command},
+    {"rest show", "file", false, "[FILE]", "Show how much a tile or block is at rest",
+     "Without a file: the tile that is part of the program.\n",
+     "  skiff rest show\n"
+     "  skiff rest show block.skiff --json\n",
+     rest_show_options, COUNT(rest_show_options), rest_show_command},
+    {"render", "folder of a run", true, "DIR", "Draw a finished run again, or export its particles",
+     "Reads what `skiff run --save-particles FPS -o DIR` left in DIR: a frame for each saved moment, with\n"
+     "another look, camera or size. --export needs no OpenGL.\n",
+     "  skiff run assets/scenes/dam-body.json -o out/dam --save-particles 30\n"
+     "  skiff render out/dam --look particles --field pressure --camera top --video\n"
+     "  skiff render out/dam --export vtk -o out/vtk\n",
+     render_options, COUNT(render_options), render_command},
+    {"gl-info", NULL, false, "", "Show how OpenGL is reached and who draws",
+     "Tries the ways to draw without a screen and prints vendor, renderer and version of the one that is\n"
+     "used. Exit code 4 where none works, with the packages to install.\n",
+     "  skiff gl-info\n"
+     "  skiff gl-info --gl osmesa\n",
+     gl_info_options, COUNT(gl_info_options), gl_info_command},
 };
 
 /* ---- Help ---- */
@@ -157,23 +315,27 @@ static void print_wrapped(const char *text, int indent, int width) {
     putchar('\n');
 }
 
+static void print_usage(const Command *command) {
+    char usage[64];
+    snprintf(usage, sizeof usage, "skiff %s %s", command->name, command->arguments);
+    printf("  %-28s %s\n", usage, command->summary);
+}
+
 static void print_main_help(void) {
     printf("skiff %s: particle water around moving bodies (SPH)\n\nUsage:\n", SKIFF_VERSION);
-    for (int i = 0; i < COUNT(commands); i++) {
-        char usage[64];
-        snprintf(usage, sizeof usage, "skiff %s %s", commands[i].name, commands[i].arguments);
-        printf("  %-26s %s\n", usage, commands[i].summary);
-    }
-    printf("  %-26s %s\n", "skiff help [COMMAND]", "Show help, with every option of a command");
-    printf("  %-26s %s\n", "skiff --version", "Show version, commit and compiler");
-    fputs("\nScenes are JSON files; assets/scenes has examples and `skiff check --schema` lists every key.\n"
-          "\nExamples:\n"
-          "  skiff run assets/scenes/settling-tank.json -o out/tank     then open out/tank/report.html\n"
-          "  skiff check assets/scenes/floating-box.json\n"
-          "  skiff bench assets/scenes/bench-tank.json --json\n"
-          "\nExit codes: 0 ok, 2 usage, 3 bad input, 5 diverged, 6 reading or writing failed, 130 "
-          "interrupted.\n",
-          stdout);
+    for (int i = 0; i < COUNT(commands); i++)
+        print_usage(&commands[i]);
+    printf("  %-28s %s\n", "skiff help [COMMAND]", "Show help, with every option of a command");
+    printf("  %-28s %s\n", "skiff --version", "Show version, commit and compiler");
+    fputs(
+        "\nScenes are JSON files; assets/scenes has examples and `skiff check --schema` lists every key.\n"
+        "\nExamples:\n"
+        "  skiff run assets/scenes/settling-tank.json -o out/tank     then open out/tank/report.html\n"
+        "  skiff check assets/scenes/floating-box.json\n"
+        "  skiff bench assets/scenes/bench-tank.json --json\n"
+        "\nExit codes: 0 ok, 2 usage, 3 bad input, 4 no OpenGL, 5 diverged, 6 reading or writing failed, 130 "
+        "interrupted.\n",
+        stdout);
 }
 
 static void print_command_help(const Command *command) {
@@ -241,6 +403,21 @@ static bool set_number(const Option *option, const char *text, CliArgs *args, Er
     return true;
 }
 
+static bool set_vector(const Option *option, const char *text, CliArgs *args, Err *err) {
+    double *member = (double *)(void *)((char *)args + option->offset), value[3];
+    const char *rest = text;
+    for (int k = 0; k < 3; k++) {
+        char *end;
+        value[k] = strtod(rest, &end);
+        if (end == rest || *end != (k < 2 ? ',' : '\0') || !isfinite(value[k]))
+            return err_set(err, ERR_USAGE, "--%s: expected three numbers, %s, found \"%.80s\"", option->name,
+                           option->value, text);
+        rest = end + 1;
+    }
+    memcpy(member, value, sizeof value);
+    return true;
+}
+
 static bool set_choice(const Option *option, const char *text, CliArgs *args, Err *err) {
     int index = 0;
     Nearest nearest = nearest_begin(text);
@@ -274,6 +451,8 @@ static bool set_option(const Option *option, const char *text, CliArgs *args, Er
         return set_number(option, text, args, err);
     case OPTION_CHOICE:
         return set_choice(option, text, args, err);
+    case OPTION_VECTOR:
+        return set_vector(option, text, args, err);
     case OPTION_EDIT:
         if (args->edit_count == CLI_MAX_EDITS)
             return err_set(err, ERR_USAGE, "--set: given more than %d times", CLI_MAX_EDITS);
@@ -315,41 +494,93 @@ static bool parse(const Command *command, int argc, char **argv, CliArgs *args, 
         } else if (!only_arguments && argv[i][0] == '-' && argv[i][1] != '\0') {
             if (!parse_option(command, argc, argv, &i, args, err))
                 return false;
+        } else if (!command->operand) {
+            return err_set(err, ERR_USAGE, "takes options only, \"%.200s\" is given", argv[i]);
         } else if (args->scene) {
-            return err_set(err, ERR_USAGE, "one scene at a time: \"%.200s\" and \"%.200s\" are given",
-                           args->scene, argv[i]);
+            return err_set(err, ERR_USAGE, "one %s at a time: \"%.200s\" and \"%.200s\" are given",
+                           command->operand, args->scene, argv[i]);
         } else {
             args->scene = argv[i];
         }
     }
-    if (!args->scene && !args->help && !args->schema)
-        return err_set(err, ERR_USAGE, "the scene is missing");
+    if (command->needs_operand && !args->scene && !args->help && !args->schema)
+        return err_set(err, ERR_USAGE, "the %s is missing", command->operand);
     return true;
 }
 
 static CliArgs default_args(void) {
-    return (CliArgs){.duration = NAN, .checkpoint_every = 120, .settle = 1.2, .steps = 20, .windows = 5};
+    return (CliArgs){.duration = NAN,
+                     .checkpoint_every = 120,
+                     .settle = 1.2,
+                     .steps = 20,
+                     .windows = 5,
+                     .edge = 12,
+                     .seed = 1,
+                     .min = {NAN, NAN, NAN},
+                     .max = {NAN, NAN, NAN},
+                     .pictures = {.look = -1, .field = -1, .hud = -1, .fade = -1, .gl = -1, .export = -1}};
 }
 
 /* ---- Running ---- */
 
-static const Command *find_command(const char *name) {
-    for (int i = 0; i < COUNT(commands); i++)
-        if (strcmp(commands[i].name, name) == 0)
+/* How many of the words are the command's name; 0: they are not. */
+static int match_name(const Command *command, int count, char **words) {
+    const char *blank = strchr(command->name, ' ');
+    if (!blank)
+        return strcmp(command->name, words[0]) == 0;
+    const size_t length = (size_t)(blank - command->name);
+    return count > 1 && strlen(words[0]) == length && memcmp(command->name, words[0], length) == 0 &&
+                   strcmp(words[1], blank + 1) == 0
+               ? 2
+               : 0;
+}
+
+static const Command *find_command(int count, char **words, int *used) {
+    for (int i = 0; i < COUNT(commands); i++) {
+        *used = match_name(&commands[i], count, words);
+        if (*used > 0)
             return &commands[i];
+    }
     return NULL;
 }
 
-static int unknown_command(const char *name) {
-    char quoted[64];
-    Nearest nearest = nearest_begin(name);
+/* The second word of a command whose first is `group`, or NULL. */
+static const char *word_in_group(const Command *command, const char *group) {
+    const size_t length = strlen(group);
+    return strncmp(command->name, group, length) == 0 && command->name[length] == ' '
+               ? command->name + length + 1
+               : NULL;
+}
+
+static bool is_group(const char *word) {
     for (int i = 0; i < COUNT(commands); i++)
-        nearest_offer(&nearest, commands[i].name);
-    nearest_offer(&nearest, "help");
+        if (word_in_group(&commands[i], word))
+            return true;
+    return false;
+}
+
+static void print_group_help(const char *group) {
+    printf("Usage:\n");
+    for (int i = 0; i < COUNT(commands); i++)
+        if (word_in_group(&commands[i], group))
+            print_usage(&commands[i]);
+    printf("\n'skiff help %s COMMAND' shows the options of one.\n", group);
+}
+
+/* `word` was not found among the commands (group NULL), or among those of a group. */
+static int unknown_command(const char *group, const char *word) {
+    char quoted[64];
+    Nearest nearest = nearest_begin(word);
+    for (int i = 0; i < COUNT(commands); i++)
+        if (!group || word_in_group(&commands[i], group))
+            nearest_offer(&nearest, group ? word_in_group(&commands[i], group) : commands[i].name);
+    if (!group)
+        nearest_offer(&nearest, "help");
     const char *best = nearest_result(&nearest);
-    problems_quote(quoted, sizeof quoted, name);
-    fprintf(stderr, "skiff: unknown command %s%s%s%s\nTry 'skiff --help'.\n", quoted,
-            best ? ", did you mean " : "", best ? best : "", best ? "?" : "");
+    problems_quote(quoted, sizeof quoted, word);
+    fprintf(stderr, "skiff%s%s: unknown command %s%s%s%s\nTry 'skiff%s%s --help'.\n", group ? " " : "",
+            group ? group : "", quoted, best ? ", did you mean " : "", best ? best : "", best ? "?" : "",
+            group ? " " : "", group ? group : "");
     return ERR_USAGE;
 }
 
@@ -381,6 +612,24 @@ static int run_one(const Command *command, int argc, char **argv) {
     return (int)err.code;
 }
 
+static bool asks_for_help(const char *word) {
+    return strcmp(word, "--help") == 0 || strcmp(word, "-h") == 0;
+}
+
+/* No command has this name: the first word may be that of a group. */
+static int run_group(int count, char **words) {
+    if (!is_group(words[0]))
+        return unknown_command(NULL, words[0]);
+    if (count > 1 && !asks_for_help(words[1]))
+        return unknown_command(words[0], words[1]);
+    if (count > 1) {
+        print_group_help(words[0]);
+        return finish(ERR_NONE);
+    }
+    fprintf(stderr, "skiff %s: a command is missing\nTry 'skiff %s --help'.\n", words[0], words[0]);
+    return ERR_USAGE;
+}
+
 int cli_main(int argc, char **argv) {
     if (argc < 2) {
         fputs("skiff: a command is missing\nTry 'skiff --help'.\n", stderr);
@@ -392,16 +641,20 @@ int cli_main(int argc, char **argv) {
         return finish(ERR_NONE);
     }
     bool is_help = strcmp(name, "help") == 0;
-    if (strcmp(name, "--help") == 0 || strcmp(name, "-h") == 0 || (is_help && argc < 3)) {
+    if (asks_for_help(name) || (is_help && argc < 3)) {
         print_main_help();
         return finish(ERR_NONE);
     }
-    const Command *command = find_command(is_help ? argv[2] : name);
-    if (!command)
-        return unknown_command(is_help ? argv[2] : name);
-    if (is_help) {
+    int count = argc - 1 - is_help, used;
+    char **words = argv + 1 + is_help;
+    const Command *command = find_command(count, words, &used);
+    if (is_help && !command && count == 1 && is_group(words[0]))
+        print_group_help(words[0]);
+    else if (!command)
+        return run_group(count, words);
+    else if (is_help)
         print_command_help(command);
-        return finish(ERR_NONE);
-    }
-    return run_one(command, argc - 2, argv + 2);
+    else
+        return run_one(command, count - used, words + used);
+    return finish(ERR_NONE);
 }

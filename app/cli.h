@@ -2,17 +2,25 @@
 #ifndef SKIFF_APP_CLI_H
 #define SKIFF_APP_CLI_H
 
-#include "engine/skiff.h"
+#include "engine/base/err.h"
 
 enum { CLI_MAX_EDITS = 64 };
 
+/* What it said about pictures. -1, 0 and NULL: nothing. */
+typedef struct CliPictures {
+    bool render, no_render, video;
+    int look, field, hud, fade, gl, export; /* position in the option's list of words */
+    int fps, supersample, save_particles;
+    const char *size, *camera, *frames;
+} CliPictures;
+
 /* What the command line said. Options that a command does not have keep their defaults. */
 typedef struct CliArgs {
-    const char *scene;                /* NULL where it may be left out and was */
-    const char *output;               /* -o; NULL: not given */
-    double duration;                  /* s; NaN: the scene's */
-    int threads;                      /* 0: one for each core */
-    int simd;                         /* SkiffSimd */
+    const char *scene;  /* what a command is about, mostly a scene; NULL: left out where it may be */
+    const char *output; /* -o; NULL: not given */
+    double duration;    /* s; NaN: the scene's */
+    int threads;        /* 0: one for each core */
+    int simd;           /* SkiffSimd */
     const char *edits[CLI_MAX_EDITS]; /* --set, in order */
     int edit_count;
     bool force, resume, quiet;
@@ -22,6 +30,10 @@ typedef struct CliArgs {
     int steps, windows;
     bool json, no_results;
     const char *results; /* NULL: the source tree's */
+    CliPictures pictures;
+    double edge; /* rest make, d */
+    int seed;
+    double min[3], max[3]; /* rest cut, m; NaN: not given */
     bool help;
 } CliArgs;
 

@@ -15,6 +15,7 @@
 #include "scene.h"
 #include "summary.h"
 #include "tables.h"
+#include "view.h"
 
 #include "engine/base/file.h"
 #include "engine/base/log.h"
@@ -34,6 +35,7 @@ typedef struct Run {
     Scene *scene;
     SkiffSim *sim;
     Tables tables;
+    View *view; /* NULL: no pictures */
     Progress progress;
     double end_time;                    /* s, simulated */
     double next_flush, next_checkpoint; /* s, wall clock */
@@ -104,13 +106,14 @@ static bool find_difference(const json_t *a, const json_t *b, char *path, size_t
     return true;
 }
 
-/* What a resumed run may change: how long it is and how it is called. */
+/* What a resumed run may change: how long it is, how it is called and how it is drawn. */
 static json_t *comparable(const Scene *scene) {
     json_t *effective = scene_effective(scene);
     json_object_del(json_object_get(effective, "Configuration"), "duration");
     json_object_del(effective, "title");
     json_object_del(effective, "description");
     json_object_del(effective, "$schema");
+    json_object_del(effective, "Render");
     return effective;
 }
 
@@ -146,7 +149,7 @@ static bool remove_old(const Run *run, Err *err) {
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         if (unlink(path_in(run, names[i], path)) != 0 && errno != ENOENT)
             return err_set(err, ERR_IO, "%s: cannot be replaced: %s", path, strerror(errno));
-    return true;
+    return frames_remove(run->args->output, err);
 }
 
 static bool begin(Run *run, Err *err) {
@@ -163,7 +166,7 @@ static bool begin(Run *run, Err *err) {
     json_t *effective = scene_effective(run->scene);
     bool written = json_text_write(path_in(run, "scene.json", path), effective, err);
     json_decref(effective);
-    return written;
+    return written && (!run->view || view_begin(run->view, run->sim, args->output, err));
 }
 
 /* ---- Stepping ---- */
@@ -173,8 +176,16 @@ static bool checkpoint(Run *run, const char *name, Err *err) {
     return tables_flush(&run->tables, true, err) && skiff_save(run->sim, path_in(run, name, path), err);
 }
 
+static bool draw_frames(Run *run, Err *err) {
+    ViewControls controls = view_controls_none();
+    controls.step_ms = skiff_stats(run->sim)->step_ms;
+    return !run->view || view_step(run->view, run->sim, &controls, err);
+}
+
 static bool after_step(Run *run, Err *err) {
     tables_add(&run->tables, run->sim);
+    if (!draw_frames(run, err))
+        return false;
     progress_step(&run->progress, run->sim);
     double now = run->progress.last;
     if (now >= run->next_flush) {
@@ -183,7 +194,7 @@ static bool after_step(Run *run, Err *err) {
         run->next_flush = now + flush_period;
     }
     if (now >= run->next_checkpoint) {
-        if (!checkpoint(run, "state.skiff", err))
+        if (!checkpoint(run, "state.skiff", err) || !view_save(run->view, err))
             return false;
         run->next_checkpoint = progress_clock() + run->args->checkpoint_every;
     }
@@ -250,8 +261,8 @@ static bool write_results(Run *run, const RunEnd *end, Err *err) {
 static bool end_diverged(Run *run, Err *err) {
     Err other = {0};
     RunEnd end = {"diverged", err->message};
-    if (!checkpoint(run, "diverged.skiff", &other) || !tables_close(&run->tables, &other) ||
-        !write_results(run, &end, &other))
+    if (!view_finish(run->view, &other) || !checkpoint(run, "diverged.skiff", &other) ||
+        !tables_close(&run->tables, &other) || !write_results(run, &end, &other))
         err_add(err, ERR_DIVERGED, "%s", other.message);
     else
         err_add(err, ERR_DIVERGED, "the state is in %s/diverged.skiff", run->args->output);
@@ -261,8 +272,8 @@ static bool end_diverged(Run *run, Err *err) {
 static bool end_normally(Run *run, Err *err) {
     bool interrupted = !is_finished(run);
     RunEnd end = {interrupted ? "interrupted" : "finished", ""};
-    if (!checkpoint(run, "state.skiff", err) || !tables_close(&run->tables, err) ||
-        !write_results(run, &end, err))
+    if (!view_finish(run->view, err) || !checkpoint(run, "state.skiff", err) || !view_save(run->view, err) ||
+        !tables_close(&run->tables, err) || !write_results(run, &end, err))
         return false;
     return !interrupted ||
            err_set(err, ERR_INTERRUPTED, "skiff run: interrupted; add --resume to go on from here");
@@ -286,6 +297,11 @@ static bool run_scene(Run *run, Err *err) {
     if (interrupt_pending())
         return err_set(err, ERR_INTERRUPTED,
                        "skiff run: interrupted before the first step; nothing was written");
+    ViewOptions options;
+    if (!view_options_make(&options, run->args, run->scene, err))
+        return false;
+    if (view_options_needed(&options) && !(run->view = view_create(&options, run->scene, run->sim, err)))
+        return err->code != ERR_GL ? false : err_add(err, ERR_GL, "--no-render simulates without pictures");
     run->end_time = run->scene->def.start_time + run->scene->duration;
     if (!begin(run, err))
         return false;
@@ -301,6 +317,7 @@ bool run_command(const CliArgs *args, Err *err) {
     bool ok = run_scene(&run, err);
     log_set_sink(NULL, NULL, LOG_WARNING);
     tables_close(&run.tables, NULL);
+    view_destroy(run.view);
     skiff_destroy(run.sim);
     scene_free(run.scene);
     return ok;

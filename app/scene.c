@@ -30,7 +30,20 @@ static SkiffGeometryDef placed(const ScenePlacement *placement) {
     return geometry;
 }
 
+static void set_round(SkiffGeometryDef *geometry, SkiffGeometryKind kind, const SceneRound *round) {
+    geometry->kind = kind;
+    geometry->radius = round->radius;
+    geometry->inner_radius = round->inner_radius;
+    geometry->top_radius = round->top_radius;
+    geometry->height = round->height;
+    geometry->branches = round->branches;
+}
+
 static SkiffTankDef tank_def(const SceneTank *tank, Pool *pool) {
+    static const SkiffGeometryKind rounds[] = {[SCENE_TANK_SPHERE] = SKIFF_GEOMETRY_SPHERE,
+                                               [SCENE_TANK_CYLINDER] = SKIFF_GEOMETRY_CYLINDER,
+                                               [SCENE_TANK_STAR] = SKIFF_GEOMETRY_STAR,
+                                               [SCENE_TANK_CONE] = SKIFF_GEOMETRY_CONE};
     SkiffTankDef def = {
         .geometry = placed(&tank->placement), .open = tank->open, .wet_height = tank->wet_height};
     SkiffGeometryDef *geometry = &def.geometry;
@@ -43,6 +56,8 @@ static SkiffTankDef tank_def(const SceneTank *tank, Pool *pool) {
             geometry->size[k] = tank->max[k] - tank->min[k];
             geometry->translation[k] = 0.5f * (tank->min[k] + tank->max[k]);
         }
+    } else if (tank->type != SCENE_TANK_PLANES) {
+        set_round(geometry, rounds[tank->type], &tank->round);
     } else {
         size_t count = (size_t)tank->planes.count;
         const ScenePlane *planes = tank->planes.items;
@@ -70,6 +85,12 @@ static SkiffBodyDef body_def(const SceneBody *body) {
     } else if (!isnan(body->sphere)) {
         def.geometry.kind = SKIFF_GEOMETRY_SPHERE;
         def.geometry.radius = body->sphere;
+    } else if (body->cylinder) {
+        set_round(&def.geometry, SKIFF_GEOMETRY_CYLINDER, body->cylinder);
+    } else if (body->star) {
+        set_round(&def.geometry, SKIFF_GEOMETRY_STAR, body->star);
+    } else if (body->cone) {
+        set_round(&def.geometry, SKIFF_GEOMETRY_CONE, body->cone);
     } else {
         def.geometry.kind = SKIFF_GEOMETRY_BOX;
         memcpy(def.geometry.size, body->box, sizeof def.geometry.size);
@@ -132,6 +153,7 @@ static void fill_def(Scene *scene) {
     scene->title = file->title;
     scene->duration = configuration->duration;
     scene->probe_rate = configuration->probe_rate;
+    scene->render = file->render;
 }
 
 /* ---- Reading ---- */

@@ -7,11 +7,12 @@
 #include <jansson.h>
 
 typedef struct Scene {
-    const char *file;  /* as the user named it */
-    const char *title; /* "" where there is none */
-    double duration;   /* s, from def.start_time */
-    double probe_rate; /* Hz; 0: every step */
-    SkiffDef def;      /* strings and arrays belong to the scene */
+    const char *file;                 /* as the user named it */
+    const char *title;                /* "" where there is none */
+    double duration;                  /* s, from def.start_time */
+    double probe_rate;                /* Hz; 0: every step */
+    SkiffDef def;                     /* strings and arrays belong to the scene */
+    const struct SceneRender *render; /* NULL: the file has no section "Render" */
     struct SceneContent *content;
 } Scene;
 

@@ -138,6 +138,89 @@ static void check_rotation(const ScenePlacement *placement, Problems *problems) 
     }
 }
 
+/* ---- Cylinders, stars and cones, shared by tanks and bodies ---- */
+
+/* `variants` are those of a tank; members of bodies have 0. */
+#define RADIUS_ROW(struct_type, member, mask)                                                                \
+    {                                                                                                        \
+        ROW(FIELD_FLOAT, struct_type, member, "radius"), LENGTH,                                             \
+            .flags = FIELD_REQUIRED, .variants = mask,                                                       \
+            .help = "Of a sphere or cylinder, of a star's tips, of a cone's floor"                           \
+    }
+#define HEIGHT_ROW(struct_type, member, mask)                                                                \
+    {                                                                                                        \
+        ROW(FIELD_FLOAT, struct_type, member, "height"), LENGTH,                                             \
+            .flags = FIELD_REQUIRED, .variants = mask, .help = "Along y; half of it below its own origin"    \
+    }
+#define TOP_RADIUS_ROW(struct_type, member, mask)                                                            \
+    {                                                                                                        \
+        ROW(FIELD_FLOAT, struct_type, member, "topRadius"),                                                  \
+            .min = 0, .max = 1e5, .unit = "m", .flags = FIELD_REQUIRED, .variants = mask,                    \
+            .help = "Of the cone's top, narrower or wider than its floor; 0: a tip"                          \
+    }
+#define INNER_RADIUS_ROW(struct_type, member, mask)                                                          \
+    {                                                                                                        \
+        ROW(FIELD_FLOAT, struct_type, member, "innerRadius"), LENGTH,                                        \
+            .flags = FIELD_REQUIRED, .variants = mask,                                                       \
+            .help = "Of the corners between a star's tips; at most radius"                                   \
+    }
+#define BRANCHES_ROW(struct_type, member, mask)                                                              \
+    {                                                                                                        \
+        ROW(FIELD_INT, struct_type, member, "branches"),                                                     \
+            .min = 2, .max = SKIFF_MAX_BRANCHES, .variants = mask,                                           \
+            .help = "Tips of the star; the first one points towards +z"                                      \
+    }
+
+static SceneRound default_round(void) {
+    SkiffGeometryDef geometry = skiff_geometry_default();
+    return (SceneRound){.branches = geometry.branches};
+}
+
+static void init_round(void *object) {
+    *(SceneRound *)object = default_round();
+}
+
+static void check_star(const SceneRound *star, Problems *problems) {
+    if (star->inner_radius > star->radius) {
+        size_t mark = problems_enter(problems, "innerRadius");
+        problems_add(problems, "%g is above radius, which is %g", (double)star->inner_radius,
+                     (double)star->radius);
+        problems_leave(problems, mark);
+    }
+}
+
+static void check_body_star(void *object, Problems *problems) {
+    check_star(object, problems);
+}
+
+static const Field cylinder_fields[] = {RADIUS_ROW(SceneRound, radius, 0), HEIGHT_ROW(SceneRound, height, 0)};
+static const Field star_fields[] = {BRANCHES_ROW(SceneRound, branches, 0), RADIUS_ROW(SceneRound, radius, 0),
+                                    INNER_RADIUS_ROW(SceneRound, inner_radius, 0),
+                                    HEIGHT_ROW(SceneRound, height, 0)};
+static const Field cone_fields[] = {RADIUS_ROW(SceneRound, radius, 0),
+                                    TOP_RADIUS_ROW(SceneRound, top_radius, 0),
+                                    HEIGHT_ROW(SceneRound, height, 0)};
+
+static const FieldRule star_rules[] = {{"radius|innerRadius", check_body_star}};
+
+static const ObjectType cylinder_type = {.help = "An upright cylinder",
+                                         .fields = cylinder_fields,
+                                         .field_count = COUNT(cylinder_fields),
+                                         .size = sizeof(SceneRound),
+                                         .init = init_round};
+static const ObjectType star_type = {.help = "An upright prism over a star with straight edges",
+                                     .fields = star_fields,
+                                     .field_count = COUNT(star_fields),
+                                     .size = sizeof(SceneRound),
+                                     .init = init_round,
+                                     .rules = star_rules,
+                                     .rule_count = COUNT(star_rules)};
+static const ObjectType cone_type = {.help = "An upright cone or truncated cone",
+                                     .fields = cone_fields,
+                                     .field_count = COUNT(cone_fields),
+                                     .size = sizeof(SceneRound),
+                                     .init = init_round};
+
 /* ---- Tank ---- */
 
 static void init_plane(void *object) {
@@ -170,12 +253,23 @@ static const ObjectType plane_type = {.help = "A flat wall",
                                       .rules = plane_rules,
                                       .rule_count = COUNT(plane_rules)};
 
-enum { BOX = 1 << SCENE_TANK_BOX, MESH = 1 << SCENE_TANK_MESH, PLANES = 1 << SCENE_TANK_PLANES };
+enum {
+    BOX = 1 << SCENE_TANK_BOX,
+    MESH = 1 << SCENE_TANK_MESH,
+    PLANES = 1 << SCENE_TANK_PLANES,
+    SPHERE = 1 << SCENE_TANK_SPHERE,
+    CYLINDER = 1 << SCENE_TANK_CYLINDER,
+    STAR = 1 << SCENE_TANK_STAR,
+    CONE = 1 << SCENE_TANK_CONE,
+    UPRIGHT = CYLINDER | STAR | CONE
+};
 
 static void init_tank(void *object) {
     SkiffTankDef tank = skiff_def_default().tank;
-    *(SceneTank *)object =
-        (SceneTank){.open = tank.open, .placement = default_placement(), .wet_height = tank.wet_height};
+    *(SceneTank *)object = (SceneTank){.open = tank.open,
+                                       .round = default_round(),
+                                       .placement = default_placement(),
+                                       .wet_height = tank.wet_height};
 }
 
 static void check_tank_box(void *object, Problems *problems) {
@@ -189,6 +283,24 @@ static void check_tank_rotation(void *object, Problems *problems) {
     check_rotation(&tank->placement, problems);
 }
 
+static void check_tank_star(void *object, Problems *problems) {
+    const SceneTank *tank = object;
+    if (tank->type == SCENE_TANK_STAR)
+        check_star(&tank->round, problems);
+}
+
+/* The lid is what lies at the very top: that of a tilted tank does not. */
+static void check_tank_open(void *object, Problems *problems) {
+    const SceneTank *tank = object;
+    const float *axis = tank->placement.rotation_axis;
+    const bool tilted = tank->placement.rotation_angle != 0 && (axis[0] != 0 || axis[2] != 0);
+    if (tank->open && tilted && (UPRIGHT >> tank->type & 1)) {
+        size_t mark = problems_enter(problems, "open");
+        problems_add(problems, "a tilted tank keeps its lid, expected false");
+        problems_leave(problems, mark);
+    }
+}
+
 static void check_tank_planes(void *object, Problems *problems) {
     const SceneTank *tank = object;
     if (tank->type == SCENE_TANK_PLANES && tank->planes.count < 4) {
@@ -199,16 +311,21 @@ static void check_tank_planes(void *object, Problems *problems) {
 }
 
 static const Field tank_fields[] = {
-    {ROW(FIELD_ENUM, SceneTank, type, "type"), .names = "box|mesh|planes", .flags = FIELD_REQUIRED,
-     .help = "What the walls are"},
+    {ROW(FIELD_ENUM, SceneTank, type, "type"), .names = "box|mesh|planes|sphere|cylinder|star|cone",
+     .flags = FIELD_REQUIRED, .help = "What the walls are"},
     {ROW(FIELD_VEC3, SceneTank, min, "min"), COORDINATE, .flags = FIELD_REQUIRED, .variants = BOX,
      .help = "Corner of the box with the smallest coordinates"},
     {ROW(FIELD_VEC3, SceneTank, max, "max"), COORDINATE, .flags = FIELD_REQUIRED, .variants = BOX,
      .help = "Corner of the box with the largest coordinates"},
-    {ROW(FIELD_BOOL, SceneTank, open, "open"), .variants = BOX, .help = "No lid"},
+    {ROW(FIELD_BOOL, SceneTank, open, "open"), .variants = BOX | UPRIGHT, .help = "No lid"},
     {ROW(FIELD_FILE, SceneTank, file, "geometryFile"), .flags = FIELD_REQUIRED, .variants = MESH,
      .help = "OBJ file of a closed mesh, relative to the scene; the fluid is inside it"},
-    PLACEMENT_ROWS(SceneTank, MESH),
+    BRANCHES_ROW(SceneTank, round.branches, STAR),
+    RADIUS_ROW(SceneTank, round.radius, SPHERE | UPRIGHT),
+    INNER_RADIUS_ROW(SceneTank, round.inner_radius, STAR),
+    TOP_RADIUS_ROW(SceneTank, round.top_radius, CONE),
+    HEIGHT_ROW(SceneTank, round.height, UPRIGHT),
+    PLACEMENT_ROWS(SceneTank, MESH | SPHERE | UPRIGHT),
     {ROW(FIELD_LIST, SceneTank, planes, "planes"), .max = 1000, .flags = FIELD_REQUIRED, .variants = PLANES,
      .object = &plane_type, .help = "Flat walls around a convex tank"},
     {ROW(FIELD_FLOAT, SceneTank, wet_height, "wetHeight"), COORDINATE, .flags = FIELD_NULLABLE,
@@ -217,6 +334,8 @@ static const Field tank_fields[] = {
 
 static const FieldRule tank_rules[] = {{"type|min|max", check_tank_box},
                                        {"rotationAxis|rotationAngle", check_tank_rotation},
+                                       {"type|radius|innerRadius", check_tank_star},
+                                       {"type|open|rotationAxis|rotationAngle", check_tank_open},
                                        {"type|planes", check_tank_planes}};
 
 static const ObjectType tank_type = {.help = "The walls around the fluid",
@@ -321,6 +440,13 @@ static const Field body_fields[] = {
      .group = GROUP_SHAPE, .help = "Edge lengths of a box around its own origin"},
     {ROW(FIELD_FLOAT, SceneBody, sphere, "sphere"), LENGTH, .flags = FIELD_REQUIRED | FIELD_NULLABLE,
      .group = GROUP_SHAPE, .help = "Radius of a sphere around its own origin"},
+    {ROW(FIELD_OBJECT, SceneBody, cylinder, "cylinder"), .flags = FIELD_REQUIRED | FIELD_NULLABLE,
+     .group = GROUP_SHAPE, .object = &cylinder_type, .help = "An upright cylinder around its own origin"},
+    {ROW(FIELD_OBJECT, SceneBody, star, "star"), .flags = FIELD_REQUIRED | FIELD_NULLABLE,
+     .group = GROUP_SHAPE, .object = &star_type, .help = "An upright star prism around its own origin"},
+    {ROW(FIELD_OBJECT, SceneBody, cone, "cone"), .flags = FIELD_REQUIRED | FIELD_NULLABLE,
+     .group = GROUP_SHAPE, .object = &cone_type,
+     .help = "An upright cone or truncated cone around its own origin"},
     PLACEMENT_ROWS(SceneBody, 0),
     {ROW(FIELD_FLOAT, SceneBody, density, "density"), .min = 1e-3, .max = 1e6, .unit = "kg/m^3",
      .flags = FIELD_NULLABLE, .group = GROUP_WEIGHT,
@@ -411,6 +537,190 @@ static const ObjectType probe_type = {.help = "A measurement, written to probes.
                                       .rule_count = COUNT(probe_rules),
                                       .variant_key = "type"};
 
+/* ---- Render ---- */
+
+SceneRender scene_render_default(void) {
+    return (SceneRender){.fps = 30,
+                         .width = 1280,
+                         .height = 720,
+                         .supersample = 1,
+                         .field_min = NAN,
+                         .field_max = NAN,
+                         .hud = RENDER_HUD_ON,
+                         .fade = true,
+                         .fade_in = 0.3f,
+                         .fade_out = 0.3f,
+                         .fade_edge = 0.5f,
+                         .ripples = 1,
+                         .sun = {-0.5f, 0.6f, 0.45f}};
+}
+
+static void init_render(void *object) {
+    *(SceneRender *)object = scene_render_default();
+}
+
+void scene_camera_default(SceneCamera *camera) {
+    *camera = (SceneCamera){.distance = NAN,
+                            .height = NAN,
+                            .look_up = NAN,
+                            .azimuth = NAN,
+                            .period = NAN,
+                            .smoothing = NAN,
+                            .fov = NAN};
+    set3(camera->eye, NAN, NAN, NAN);
+    set3(camera->target, NAN, NAN, NAN);
+    set3(camera->forward, NAN, NAN, NAN);
+}
+
+static void init_camera(void *object) {
+    scene_camera_default(object);
+}
+
+static void init_material(void *object) {
+    SceneMaterial *material = object;
+    *material = (SceneMaterial){.waterline = NAN, .cabin_base = NAN, .cabin_top = NAN};
+    set3(material->color, NAN, NAN, NAN);
+}
+
+static void check_sun(void *object, Problems *problems) {
+    const SceneRender *render = object;
+    if (render->sun[1] > 0)
+        return;
+    size_t mark = problems_enter(problems, "sun");
+    problems_enter_index(problems, 1);
+    problems_add(problems, "%g is not above 0: the sun is up", (double)render->sun[1]);
+    problems_leave(problems, mark);
+}
+
+static void check_field_range(void *object, Problems *problems) {
+    const SceneRender *render = object;
+    if (!(render->field_min >= render->field_max))
+        return;
+    size_t mark = problems_enter(problems, "fieldMax");
+    problems_add(problems, "%g is not above fieldMin, which is %g", (double)render->field_max,
+                 (double)render->field_min);
+    problems_leave(problems, mark);
+}
+
+static void check_forward(void *object, Problems *problems) {
+    const SceneCamera *camera = object;
+    if (!is_given(camera->forward) || camera->forward[0] != 0 || camera->forward[2] != 0)
+        return;
+    size_t mark = problems_enter(problems, "forward");
+    problems_add(problems, "has no horizontal direction");
+    problems_leave(problems, mark);
+}
+
+#define OPTIONAL_LENGTH .min = 1e-3, .max = 1e5, .unit = "m", .flags = FIELD_NULLABLE
+
+static const Field camera_fields[] = {
+    {ROW(FIELD_NAME, SceneCamera, name, "name"), .flags = FIELD_REQUIRED,
+     .help = "For --camera and for `camera NAME` in an input script"},
+    {ROW(FIELD_ENUM, SceneCamera, type, "type"), .names = RENDER_CAMERAS, .flags = FIELD_REQUIRED,
+     .help = "Behind a body; still; circling it; above it; on board"},
+    {ROW(FIELD_NAME, SceneCamera, body, "body"), .flags = FIELD_NULLABLE,
+     .help = "That is followed; absent: the first dynamic one, or the middle of the scene (fixed: none)"},
+    {ROW(FIELD_VEC3, SceneCamera, eye, "eye"), COORDINATE, .flags = FIELD_NULLABLE,
+     .help = "fixed: in the world; bow: from the body's centre, along its axes"},
+    {ROW(FIELD_VEC3, SceneCamera, target, "target"), COORDINATE, .flags = FIELD_NULLABLE,
+     .help = "Point in the world that is looked at where no body is followed"},
+    {ROW(FIELD_VEC3, SceneCamera, forward, "forward"), .min = -1e6, .max = 1e6, .flags = FIELD_NULLABLE,
+     .help =
+         "Direction of the body's bow in the world at the start; absent: where -x of its geometry points"},
+    {ROW(FIELD_FLOAT, SceneCamera, distance, "distance"), OPTIONAL_LENGTH,
+     .help = "chase, orbit: horizontal distance from the body; top: height above it"},
+    {ROW(FIELD_FLOAT, SceneCamera, height, "height"), COORDINATE, .flags = FIELD_NULLABLE,
+     .help = "chase, orbit: of the eye above the body's centre"},
+    {ROW(FIELD_FLOAT, SceneCamera, look_up, "lookUp"), COORDINATE, .flags = FIELD_NULLABLE,
+     .help = "chase, orbit: how far above the body's centre the camera aims"},
+    {ROW(FIELD_FLOAT, SceneCamera, azimuth, "azimuth"), .min = -100, .max = 100, .unit = "rad",
+     .flags = FIELD_NULLABLE, .help = "orbit: where it is at time 0, from +x towards +z"},
+    {ROW(FIELD_FLOAT, SceneCamera, period, "period"), .min = 0, .max = 1e6, .unit = "s",
+     .flags = FIELD_NULLABLE, .help = "orbit: time for one turn; 0: it stands still"},
+    {ROW(FIELD_FLOAT, SceneCamera, smoothing, "smoothing"), .min = 0, .max = 100, .unit = "s",
+     .flags = FIELD_NULLABLE, .help = "Time in which nine tenths of a sudden change have been followed"},
+    {ROW(FIELD_FLOAT, SceneCamera, fov, "fov"), .min = 5, .max = 150, .unit = "deg", .flags = FIELD_NULLABLE,
+     .help = "Field of view, vertical"},
+};
+
+static const FieldRule camera_rules[] = {{"forward", check_forward}};
+
+static const ObjectType camera_type = {
+    .help = "A camera. Lengths that are absent follow from the size of what is looked at",
+    .fields = camera_fields,
+    .field_count = COUNT(camera_fields),
+    .size = sizeof(SceneCamera),
+    .init = init_camera,
+    .rules = camera_rules,
+    .rule_count = COUNT(camera_rules)};
+
+static const Field material_fields[] = {
+    {ROW(FIELD_NAME, SceneMaterial, name, "name"), .flags = FIELD_REQUIRED, .help = "Of a body"},
+    {ROW(FIELD_ENUM, SceneMaterial, material, "material"), .names = "paint|hull|stone",
+     .help = "hull: antifouling, stripe, topsides, wooden deck and cabin"},
+    {ROW(FIELD_VEC3, SceneMaterial, color, "color"), .min = 0, .max = 1, .flags = FIELD_NULLABLE,
+     .help = "Red, green and blue, linear; absent: the material's own"},
+    {ROW(FIELD_FLOAT, SceneMaterial, waterline, "waterline"), COORDINATE, .flags = FIELD_NULLABLE,
+     .help = "hull: y of the waterline at the start; absent: that of the water"},
+    {ROW(FIELD_FLOAT, SceneMaterial, cabin_base, "cabinBase"), COORDINATE, .flags = FIELD_NULLABLE,
+     .help = "hull: y at the start where the cabin begins; absent: there is none"},
+    {ROW(FIELD_FLOAT, SceneMaterial, cabin_top, "cabinTop"), COORDINATE, .flags = FIELD_NULLABLE,
+     .help = "hull: y at the start of the cabin's roof"},
+};
+
+static const ObjectType material_type = {.help = "What a body is made of",
+                                         .fields = material_fields,
+                                         .field_count = COUNT(material_fields),
+                                         .size = sizeof(SceneMaterial),
+                                         .init = init_material};
+
+static const Field render_fields[] = {
+    {ROW(FIELD_INT, SceneRender, fps, "fps"), .min = 1, .max = 1000, .unit = "1/s",
+     .help = "Frames a second of simulated time; the step need not fit"},
+    {ROW(FIELD_INT, SceneRender, width, "width"), .min = 16, .max = 8192, .unit = "px", .help = "Of a frame"},
+    {ROW(FIELD_INT, SceneRender, height, "height"), .min = 16, .max = 8192, .unit = "px",
+     .help = "Of a frame"},
+    {ROW(FIELD_INT, SceneRender, supersample, "supersample"), .min = 1, .max = 4,
+     .help = "Drawn that many times larger, then averaged"},
+    {ROW(FIELD_ENUM, SceneRender, look, "look"), .names = RENDER_LOOKS,
+     .help = "A water surface, or spheres"},
+    {ROW(FIELD_ENUM, SceneRender, field, "field"), .names = RENDER_FIELDS,
+     .help = "Colour of the look particles; window: distance from the window's edge"},
+    {ROW(FIELD_FLOAT, SceneRender, field_min, "fieldMin"), .min = -1e9, .max = 1e9, .flags = FIELD_NULLABLE,
+     .help = "Value of the first colour; absent: one that suits the field"},
+    {ROW(FIELD_FLOAT, SceneRender, field_max, "fieldMax"), .min = -1e9, .max = 1e9, .flags = FIELD_NULLABLE,
+     .help = "Value of the last colour"},
+    {ROW(FIELD_ENUM, SceneRender, hud, "hud"), .names = RENDER_HUDS,
+     .help = "Figures in the picture; timing: with wall-clock times, which differ between runs"},
+    {ROW(FIELD_BOOL, SceneRender, fade, "fade"),
+     .help = "Created and removed particles fade, instead of popping in and out"},
+    {ROW(FIELD_FLOAT, SceneRender, fade_in, "fadeIn"), .min = 0.001, .max = 10, .unit = "s",
+     .help = "How long a created particle takes to appear"},
+    {ROW(FIELD_FLOAT, SceneRender, fade_out, "fadeOut"), .min = 0.001, .max = 0.5, .unit = "s",
+     .help = "How long a removed particle takes to vanish"},
+    {ROW(FIELD_FLOAT, SceneRender, fade_edge, "fadeEdge"), .min = 0.001, .max = 100, .unit = "m",
+     .help = "Distance from the window's edge over which the particles give way to the ocean"},
+    {ROW(FIELD_FLOAT, SceneRender, ripples, "ripples"), .min = 0, .max = 2,
+     .help = "Strength of the wind's ripples; 0 is glass"},
+    {ROW(FIELD_VEC3, SceneRender, sun, "sun"), .min = -1e3, .max = 1e3,
+     .help = "Direction towards the sun, any length; y above 0"},
+    {ROW(FIELD_NAME, SceneRender, camera, "camera"), .flags = FIELD_NULLABLE,
+     .help = "That begins: one of `cameras` or chase, fixed, orbit, top, bow, which always exist"},
+    {ROW(FIELD_LIST, SceneRender, cameras, "cameras"), .max = 100, .object = &camera_type, .help = "Cameras"},
+    {ROW(FIELD_LIST, SceneRender, bodies, "bodies"), .max = 10000, .object = &material_type,
+     .help = "What bodies are made of; others have the colours of their meshes' materials, or a plain one"},
+};
+
+static const FieldRule render_rules[] = {{"sun", check_sun}, {"fieldMin|fieldMax", check_field_range}};
+
+static const ObjectType render_type = {.help = "How frames are drawn. Present: `skiff run` draws them",
+                                       .fields = render_fields,
+                                       .field_count = COUNT(render_fields),
+                                       .size = sizeof(SceneRender),
+                                       .init = init_render,
+                                       .rules = render_rules,
+                                       .rule_count = COUNT(render_rules)};
+
 /* ---- The file ---- */
 
 static void init_file(void *object) {
@@ -433,6 +743,8 @@ static const Field file_fields[] = {
      .help = "Solids in the fluid; they do not touch each other or the tank"},
     {ROW(FIELD_LIST, SceneFile, probes, "Probes"), .max = 10000, .object = &probe_type,
      .help = "Measurements"},
+    {ROW(FIELD_OBJECT, SceneFile, render, "Render"), .flags = FIELD_NULLABLE, .object = &render_type,
+     .help = "Frames; absent: none, unless the command line asks for them"},
 };
 
 const ObjectType scene_file_type = {.help = "A Skiff scene",

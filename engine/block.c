@@ -19,11 +19,11 @@ double block_particles(const SkiffBlockDef *def, float spacing, double counts[3]
 
 /* Signed distance to the tank's walls, negative inside; an open tank goes on above its rim. */
 static float tank_distance(const SkiffSim *sim, const float p[3]) {
-    if (sim->tank.triangle_count == 0)
+    if (sim->tank.kind == SKIFF_GEOMETRY_NONE)
         return -INFINITY;
     const float rim = sim->tank.max[1] - sim->params.particle_radius;
     const float q[3] = {p[0], sim->tank_open && p[1] > rim ? rim : p[1], p[2]};
-    return mesh_distance(&sim->tank, q, NULL);
+    return shape_distance(&sim->tank, q, NULL);
 }
 
 static bool inside_body(const SkiffSim *sim, const float p[3], int *inside) {

@@ -2,6 +2,8 @@
  * unknown (see dfsph.c), so a light body needs no substeps. Not here: collisions between bodies. */
 #include "body.h"
 
+#include "shape.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -55,68 +57,6 @@ static void invert_free(const double a[3][3], const bool use[3], double result[3
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
             result[i][j] = use[i] && use[j] ? cofactor[j][i] / det : 0.0;
-}
-
-static bool geometry_check(const SkiffGeometryDef *def, const char *path, Err *err) {
-    bool good = true;
-    for (int k = 0; k < 3; k++) {
-        if (!isfinite(def->scale[k]) || def->scale[k] == 0.0f)
-            good = err_add(err, ERR_INPUT, "%s.scale[%d]: %g, must be finite and not 0", path, k,
-                           (double)def->scale[k]);
-        if (!isfinite(def->translation[k]))
-            good = err_add(err, ERR_INPUT, "%s.translation[%d]: must be finite", path, k);
-        if (def->kind == SKIFF_GEOMETRY_BOX && !(def->size[k] > 0.0f && isfinite(def->size[k])))
-            good =
-                err_add(err, ERR_INPUT, "%s.box[%d]: %g m, must be above 0", path, k, (double)def->size[k]);
-    }
-    if (def->kind == SKIFF_GEOMETRY_SPHERE && !(def->radius > 0.0f && isfinite(def->radius)))
-        good = err_add(err, ERR_INPUT, "%s.sphere: %g m, must be above 0", path, (double)def->radius);
-    const float *axis = def->rotation_axis;
-    const float norm = sqrtf(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
-    if (!isfinite(def->rotation_angle) || !isfinite(norm))
-        good = err_add(err, ERR_INPUT, "%s.rotationAngle, rotationAxis: must be finite", path);
-    else if (def->rotation_angle != 0.0f && norm < 1e-6f)
-        good = err_add(err, ERR_INPUT, "%s.rotationAxis: has no length", path);
-    return good;
-}
-
-bool geometry_make(const SkiffGeometryDef *def, const char *path, Mesh *mesh, Err *err) {
-    enum { SPHERE_LEVEL = 4 }; /* 5120 triangles: volume 0.2 % below the sphere's */
-    if (!geometry_check(def, path, err))
-        return false;
-    bool made = false;
-    Err reason = {0};
-    switch (def->kind) {
-    case SKIFF_GEOMETRY_NONE:
-        return err_add(err, ERR_INPUT, "%s: has no geometry", path);
-    case SKIFF_GEOMETRY_MESH:
-        made = mesh_load_obj(def->file, mesh, &reason);
-        break;
-    case SKIFF_GEOMETRY_BOX: {
-        const float min[3] = {-def->size[0] / 2, -def->size[1] / 2, -def->size[2] / 2};
-        const float max[3] = {def->size[0] / 2, def->size[1] / 2, def->size[2] / 2};
-        made = mesh_make_box(min, max, mesh, &reason);
-        break;
-    }
-    case SKIFF_GEOMETRY_SPHERE:
-        made = mesh_make_sphere((const float[3]){0, 0, 0}, def->radius, SPHERE_LEVEL, mesh, &reason);
-        break;
-    case SKIFF_GEOMETRY_PLANES:
-        made = mesh_make_planes(def->plane_points, def->plane_normals, def->plane_count, mesh, &reason);
-        break;
-    }
-    if (made && !mesh_check_closed(mesh, def->file ? def->file : "geometry", &reason)) {
-        mesh_free(mesh);
-        made = false;
-    }
-    if (!made)
-        return err_add(err, reason.code, "%s: %s", path, reason.message);
-    const float *axis = def->rotation_axis;
-    const float norm = sqrtf(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
-    const float s = norm > 0.0f ? sinf(def->rotation_angle / 2) / norm : 0.0f;
-    const float quaternion[4] = {axis[0] * s, axis[1] * s, axis[2] * s, cosf(def->rotation_angle / 2)};
-    mesh_transform(mesh, def->scale, quaternion, (const float[3]){0, 0, 0});
-    return true;
 }
 
 static bool body_check(const SkiffBodyDef *def, const char *path, Err *err) {

@@ -32,10 +32,6 @@ typedef struct Body {
 bool body_make(const SkiffBodyDef *def, const char *path, Body *body, Err *err);
 void body_free(Body *body);
 
-/* Mesh of a geometry in its own rotation and scale, without the translation (which is double precision's
- * business). */
-bool geometry_make(const SkiffGeometryDef *def, const char *path, Mesh *mesh, Err *err);
-
 /* Stops the free axes of a body that is still held; gives it its initial velocity in the step of its release.
  */
 void body_hold(Body *body, double time, double dt);

@@ -68,8 +68,21 @@ static void offset_directions(const Mesh *mesh, double (*normal_sums)[3], double
     }
 }
 
-/* The mesh with its faces moved behind the surface, seen from the water. A body thinner than two offsets gets
- * a part of it: its sides would trade places. */
+/* Moves a vertex of a body inwards, by as much of the offset as keeps it well inside: where the body is
+ * thinner than two offsets (a stem, a mast, a coaming) its sides would trade places. */
+static void offset_vertex(const SurfaceDef *surface, const float vertex[3], const double direction[3],
+                          float moved[3]) {
+    for (float share = 1.0f;; share = share > 0.1f ? 0.5f * share : 0.0f) {
+        const float sign = surface->water_inside ? 1.0f : -1.0f, distance = share * surface->offset;
+        for (int k = 0; k < 3; k++)
+            moved[k] = vertex[k] + sign * distance * (float)direction[k];
+        if (surface->water_inside || share == 0.0f ||
+            mesh_distance(surface->mesh, moved, NULL) < -0.5f * distance)
+            return;
+    }
+}
+
+/* The mesh with its faces moved behind the surface, seen from the water. */
 static bool offset_mesh(const SurfaceDef *surface, Mesh *moved, Err *err) {
     const Mesh *mesh = surface->mesh;
     double(*directions)[3] = calloc(mesh->vertex_count, sizeof *directions);
@@ -83,17 +96,8 @@ static bool offset_mesh(const SurfaceDef *surface, Mesh *moved, Err *err) {
         offset_directions(mesh, directions, tensors);
         memcpy(moved->triangles, mesh->triangles, mesh->triangle_count * sizeof *moved->triangles);
     }
-    bool good = false;
-    for (float share = 1.0f; memory && !good; share = share > 0.1f ? 0.5f * share : 0.0f) {
-        const float distance = share * surface->offset, sign = surface->water_inside ? 1.0f : -1.0f;
-        good = true;
-        for (uint32_t v = 0; v < mesh->vertex_count; v++) {
-            for (int k = 0; k < 3; k++)
-                moved->vertices[v][k] = mesh->vertices[v][k] + sign * distance * (float)directions[v][k];
-            good = good && (surface->water_inside || share == 0.0f ||
-                            mesh_distance(mesh, moved->vertices[v], NULL) < -0.5f * distance);
-        }
-    }
+    for (uint32_t v = 0; memory && v < mesh->vertex_count; v++)
+        offset_vertex(surface, mesh->vertices[v], directions[v], moved->vertices[v]);
     free(directions);
     free(tensors);
     if (!memory) {
@@ -298,11 +302,15 @@ bool boundary_reserve(Boundary *boundary, uint32_t particle_capacity, int body_c
     return true;
 }
 
-bool boundary_place(Boundary *boundary, const Body *bodies, int body_count, const double origin[3],
-                    float cell_size, int threads, Err *err) {
+void boundary_place_centres(Boundary *boundary, const Body *bodies, int body_count, const double origin[3]) {
     for (int b = 0; b < body_count; b++)
         for (int k = 0; k < 3; k++)
             boundary->centres[1 + b][k] = (float)(bodies[b].position[k] - origin[k]);
+}
+
+bool boundary_place(Boundary *boundary, const Body *bodies, int body_count, const double origin[3],
+                    float cell_size, int threads, Err *err) {
+    boundary_place_centres(boundary, bodies, body_count, origin);
     BoundarySet *set = &boundary->moving;
     if (set->samples.count == 0)
         return true;
@@ -355,11 +363,12 @@ static bool apply_blocks(Boundary *boundary, const BoundaryJob *job, const Passe
     return first_fault == UINT32_MAX;
 }
 
-bool boundary_apply(Boundary *boundary, Rows *rows, const Passes *passes, const Particles *particles,
-                    int threads, Err *err) {
+bool boundary_apply(Boundary *boundary, Rows *rows, const RowsJob *build, Err *err) {
+    const Particles *particles = build->particles;
     const BoundaryJob job = {.sets = {&boundary->fixed.sorted, &boundary->moving.sorted},
                              .position = (const Float4 *)particles->position,
                              .centres = (const Float4 *)boundary->centres,
+                             .frozen = build->frozen,
                              .count = particles->count,
                              .kernel = rows->pairs.kernel,
                              .gradient_unit = rows->pairs.gradient_unit,
@@ -367,7 +376,7 @@ bool boundary_apply(Boundary *boundary, Rows *rows, const Passes *passes, const 
                              .gradient_sum = rows->gradient_sum.data,
                              .neighbours = rows->neighbours};
     uint32_t fault;
-    if (!apply_blocks(boundary, &job, passes, rows, threads, &fault))
+    if (!apply_blocks(boundary, &job, build->passes, rows, build->threads, &fault))
         return err_set(err, ERR_DIVERGED, "particle %llu touches more than %d walls and bodies at once",
                        (unsigned long long)particles->id[fault], MAX_CONTACT_OBJECTS);
     if (boundary->contact_count <= boundary->contact_capacity)
@@ -380,7 +389,7 @@ bool boundary_apply(Boundary *boundary, Rows *rows, const Passes *passes, const 
     boundary->contacts = boundary->contact_buffer.data;
     BoundaryJob again = job;
     again.density = NULL;
-    return apply_blocks(boundary, &again, passes, rows, threads, &fault);
+    return apply_blocks(boundary, &again, build->passes, rows, build->threads, &fault);
 }
 
 void boundary_impulse(const Boundary *boundary, const float *p, uint32_t blocks, double (*totals)[6],

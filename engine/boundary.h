@@ -61,12 +61,13 @@ void boundary_set_free(BoundarySet *set);
 bool boundary_reserve(Boundary *boundary, uint32_t particle_capacity, int body_count, Err *err);
 /* Sorts a set's world positions into cells of edge h. */
 bool boundary_sort(BoundarySet *set, float cell_size, Err *err);
+void boundary_place_centres(Boundary *boundary, const Body *bodies, int body_count, const double origin[3]);
 /* Moves the bodies' samples to where the bodies are and sorts them. */
 bool boundary_place(Boundary *boundary, const Body *bodies, int body_count, const double origin[3],
                     float cell_size, int threads, Err *err);
-/* Boundary terms of all particles: densities and gradient sums are completed, contacts listed. */
-bool boundary_apply(Boundary *boundary, Rows *rows, const Passes *passes, const Particles *particles,
-                    int threads, Err *err);
+/* Boundary terms of all particles that have a row: densities and gradient sums are completed, contacts
+ * listed. */
+bool boundary_apply(Boundary *boundary, Rows *rows, const RowsJob *job, Err *err);
 /* Sum over the contacts of p_i (g, t) for every object: totals[object][6]; in order, so independent of the
  * threads. */
 void boundary_impulse(const Boundary *boundary, const float *p, uint32_t blocks, double (*totals)[6],

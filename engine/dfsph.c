@@ -203,7 +203,8 @@ static Errors evaluate_residual(Dfsph *dfsph, const DfsphProblem *problem, const
     }
     double totals[2];
     total_partials(dfsph, blocks, 2, totals);
-    return (Errors){totals[0] / problem->particles->count, totals[1] / problem->particles->count};
+    const double count = problem->evaluated_count;
+    return (Errors){totals[0] / count, totals[1] / count};
 }
 
 /* What a density solve corrects: a share gamma of the density error, and the error that this step's motion
@@ -247,7 +248,8 @@ static void prepare(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, f
             const bool few = kind == SOLVE_DIVERGENCE && problem->rows->neighbours[i] < MIN_NEIGHBOURS;
             const bool takes_part = i < count && gradient_sum[i][3] > MIN_DIAGONAL && !few;
             dfsph->inv_diagonal[i] = takes_part ? 1.0f / gradient_sum[i][3] : 0.0f;
-            p[i] = takes_part && p[i] > 0.0f ? warm * p[i] : 0.0f;
+            if (problem->frozen == NULL || !problem->frozen[i])
+                p[i] = takes_part && p[i] > 0.0f ? warm * p[i] : 0.0f;
             /* divergence: where there is room to the rest density, approaching is no fault: thin water falls
              * together freely */
             dfsph->source[i] = kind == SOLVE_DENSITY ? density_source(problem->params, density[i],
@@ -325,7 +327,7 @@ static double gcr_update(Dfsph *dfsph, const DfsphProblem *problem, float *p, fl
     }
     double totals[3];
     total_partials(dfsph, blocks, 3, totals);
-    const double count = problem->particles->count;
+    const double count = problem->evaluated_count;
     *errors = (Errors){totals[0] / count, totals[1] / count};
     return totals[2] / count;
 }
@@ -386,7 +388,7 @@ static SolveResult solve_jacobi(Dfsph *dfsph, const DfsphProblem *problem, float
 
 SolveResult dfsph_solve(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind) {
     const SkiffParams *params = problem->params;
-    if (problem->particles->count == 0)
+    if (problem->evaluated_count == 0)
         return (SolveResult){0};
     float *p = kind == SOLVE_DENSITY ? problem->particles->pressure : problem->particles->pressure_divergence;
     const SolveLimits limits =
@@ -395,7 +397,7 @@ SolveResult dfsph_solve(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kin
                             params->max_iterations}
             : (SolveLimits){(double)params->max_divergence_error / 100.0, params->min_divergence_iterations,
                             params->max_divergence_iterations};
-    dfsph->moving = problem->boundary->moving.samples.count != 0;
+    dfsph->moving = problem->body_count > 0 && problem->boundary->moving.samples.count != 0;
     prepare(dfsph, problem, kind, p);
     const SolveResult result = params->pressure_solver == 0 ? solve_gcr(dfsph, problem, p, limits)
                                                             : solve_jacobi(dfsph, problem, p, limits);

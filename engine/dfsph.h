@@ -9,7 +9,7 @@ typedef enum SolveKind { SOLVE_DIVERGENCE, SOLVE_DENSITY } SolveKind;
 
 typedef struct SolveResult {
     int iterations;  /* applications of the operator, the one for the warm start included */
-    double error;    /* mean over all particles of max(0, residual), relative density */
+    double error;    /* mean over the evaluated particles of max(0, residual), relative density */
     double residual; /* mean two-sided residual: |r| where there is pressure, max(0, r) elsewhere */
 } SolveResult;
 
@@ -36,6 +36,8 @@ typedef struct DfsphProblem {
     Body *bodies;
     int body_count;
     Particles *particles;
+    const uint8_t *frozen;    /* NULL, or [particles] 1: has no row, does not move, and keeps its pressure */
+    uint32_t evaluated_count; /* particles that are not frozen: errors are means over these */
     int threads;
 } DfsphProblem;
 

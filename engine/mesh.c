@@ -39,6 +39,8 @@ void mesh_free(Mesh *mesh) {
     mesh_free_tree(mesh);
     free(mesh->vertices);
     free(mesh->triangles);
+    free(mesh->materials);
+    free(mesh->material_names);
     memset(mesh, 0, sizeof *mesh);
 }
 
@@ -129,6 +131,8 @@ bool mesh_finish(Mesh *mesh, const char *name, Err *err) {
         uint32_t a = map[corner[0]], b = map[corner[1]], c = map[corner[2]];
         if (a == b || b == c || c == a)
             continue;
+        if (mesh->materials)
+            mesh->materials[kept] = mesh->materials[t];
         mesh->triangles[kept][0] = a;
         mesh->triangles[kept][1] = b;
         mesh->triangles[kept++][2] = c;

@@ -6,12 +6,17 @@
 
 #include <stdint.h>
 
+enum { MESH_MAX_MATERIALS = 256, MESH_NAME_SIZE = 32 };
+
 /* Positions in metres, right-handed, y up; triangles counter-clockwise seen from outside. */
 typedef struct Mesh {
     float (*vertices)[3];
     uint32_t (*triangles)[3];
     uint32_t vertex_count;
     uint32_t triangle_count;
+    uint8_t *materials; /* of each triangle, an index into the names; NULL: all of one nameless material */
+    char (*material_names)[MESH_NAME_SIZE];
+    uint32_t material_count;
     float min[3], max[3];  /* bounds of the referenced vertices */
     struct MeshTree *tree; /* distance queries; built by mesh_build_tree */
 } Mesh;
@@ -28,16 +33,24 @@ typedef struct MeshMass {
 /* Every maker of a mesh leaves *mesh all zero when it fails, so that mesh_free is always allowed.
  *
  * Reads v and f records (triangles and polygons, which are fanned from their first corner: they should be
- * convex; negative indices; v/vt/vn forms); other records are ignored. ERR_INPUT with file:line on anything
+ * convex; negative indices; v/vt/vn forms), and usemtl records, of which the names are kept (faces before the
+ * first one: ""); other records are ignored. ERR_INPUT with file:line on anything
  * malformed: coordinates that are not finite or beyond 1e9, index out of range, fewer than 3 corners, a
- * corner repeated. Vertices that coincide exactly are merged, so that meshes with split normals are still
- * closed; triangles that collapse by it carry no surface and are left out. */
+ * corner repeated, a material's name that is missing or longer than MESH_NAME_SIZE - 1, too many of them.
+ * Vertices that coincide exactly are merged, so that meshes with split normals are still closed; triangles
+ * that collapse by it carry no surface and are left out. */
 bool mesh_load_obj(const char *path, Mesh *mesh, Err *err);
 bool mesh_parse_obj(const char *name, const char *text, size_t size, Mesh *mesh, Err *err);
 /* Axis-aligned box, 8 vertices, 12 triangles. */
 bool mesh_make_box(const float min[3], const float max[3], Mesh *mesh, Err *err);
 /* Icosphere of 20 * 4^level triangles with vertices on the sphere; level 0..8. */
 bool mesh_make_sphere(const float centre[3], float radius, int level, Mesh *mesh, Err *err);
+/* The solid between an outline at y = -height / 2 and another of as many points (x, z) at y = height / 2,
+ * joined point to point. Each outline runs from z to x (clockwise in the x-z plane) once around the y axis,
+ * which sees all of it, or is a point on that axis. Points: 3 or more; they lie on the surface. ERR_INPUT
+ * otherwise. */
+bool mesh_make_prism(const float (*bottom)[2], const float (*top)[2], uint32_t count, float height,
+                     Mesh *mesh, Err *err);
 /* Convex polyhedron: points p with (p - point_k) . normal_k <= 0 for all k planes (at most 1024; normals of
  * any length > 0). Details below 1e-6 of the extent of the points are not resolved. ERR_INPUT when empty or
  * unbounded. */
@@ -67,7 +80,11 @@ void mesh_free_tree(Mesh *mesh);
 /* Signed distance in m, negative inside, exact for closed meshes (angle-weighted pseudo-normals, [Baerentzen
  * & Aanaes 2005]). Needs the tree. closest may be NULL. */
 float mesh_distance(const Mesh *mesh, const float point[3], float closest[3]);
-/* Batch of the above, on all OpenMP threads; the same values. */
-void mesh_distances(const Mesh *mesh, const float (*points)[3], uint32_t count, float *distances);
+/* The same distance and its gradient: a unit vector, away from the closest point outside, towards it inside;
+ * on the surface the (pseudo-)normal there. */
+float mesh_distance_gradient(const Mesh *mesh, const float point[3], float gradient[3]);
+/* The same distances of many points (their fourth number is not used) on this many OpenMP threads. */
+void mesh_distances(const Mesh *mesh, const float (*points)[4], uint32_t count, float *distances,
+                    int threads);
 
 #endif

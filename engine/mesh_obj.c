@@ -1,4 +1,5 @@
-/* Wavefront OBJ input: v and f records. Normals, texture coordinates, groups and materials are not kept.
+/* Wavefront OBJ input: v, f and usemtl records. Normals, texture coordinates and groups are not kept, and
+ * what a material looks like is the business of whoever draws: only its name is read.
  *
  * The text is hostile: it need not end in a newline or a zero, and nothing in it is trusted before it is
  * checked. Two passes, so that memory is asked for once and a face may name a vertex that follows it. */
@@ -29,6 +30,7 @@ typedef struct Reader {
     char token[TOKEN_SIZE];
     Mesh *mesh;
     uint32_t vertex_count, triangle_count; /* read so far */
+    uint8_t material;                      /* of the next face */
     Err *err;
 } Reader;
 
@@ -146,6 +148,8 @@ static bool read_face(Reader *reader) {
         if (corner == 0)
             first = vertex;
         if (corner >= 2) {
+            if (reader->mesh->materials)
+                reader->mesh->materials[reader->triangle_count] = reader->material;
             uint32_t *triangle = reader->mesh->triangles[reader->triangle_count++];
             triangle[0] = first;
             triangle[1] = previous;
@@ -160,6 +164,38 @@ static bool read_face(Reader *reader) {
     return true;
 }
 
+/* Makes `name` the material of the faces that follow. */
+static bool use_material(Reader *reader, const char *name) {
+    Mesh *mesh = reader->mesh;
+    uint32_t index = 0;
+    while (index < mesh->material_count && strcmp(mesh->material_names[index], name) != 0)
+        index++;
+    if (index == MESH_MAX_MATERIALS)
+        return err_set(reader->err, ERR_INPUT,
+                       "%s:%" PRIu32 ": material '%s' is one more than the %d allowed", reader->name,
+                       reader->line, name, (int)MESH_MAX_MATERIALS);
+    if (index == mesh->material_count)
+        strcpy(mesh->material_names[mesh->material_count++], name);
+    reader->material = (uint8_t)index;
+    return true;
+}
+
+static bool read_material(Reader *reader) {
+    const bool found = next_token(reader);
+    if (!found || strlen(reader->token) >= MESH_NAME_SIZE)
+        return err_set(reader->err, ERR_INPUT,
+                       "%s:%" PRIu32 ": usemtl '%s': a name of 1 to %d characters is needed", reader->name,
+                       reader->line, found ? reader->token : "", MESH_NAME_SIZE - 1);
+    return use_material(reader, reader->token);
+}
+
+static bool allocate_materials(Mesh *mesh, size_t triangle_count, const char *name, Err *err) {
+    mesh->materials = calloc(triangle_count + 1, sizeof *mesh->materials);
+    mesh->material_names = calloc(MESH_MAX_MATERIALS, sizeof *mesh->material_names);
+    return (mesh->materials && mesh->material_names) ||
+           err_set(err, ERR_INPUT, "%s: no memory for the materials of %zu triangles", name, triangle_count);
+}
+
 static bool read_records(Reader *reader) {
     while (next_line(reader)) {
         if (!next_token(reader))
@@ -170,20 +206,28 @@ static bool read_records(Reader *reader) {
                 if (!read_coordinate(reader, k, &out[k]))
                     return false;
             reader->vertex_count++; /* a weight or a colour may follow; neither is used */
-        } else if (strcmp(reader->token, "f") == 0 && !read_face(reader)) {
+        } else if (strcmp(reader->token, "f") == 0) {
+            if (reader->mesh->materials && reader->mesh->material_count == 0 && !use_material(reader, ""))
+                return false;
+            if (!read_face(reader))
+                return false;
+        } else if (strcmp(reader->token, "usemtl") == 0 && !read_material(reader)) {
             return false;
         }
     }
     return true;
 }
 
-static void count_records(Reader reader, size_t *vertex_count, size_t *triangle_count) {
+static void count_records(Reader reader, size_t *vertex_count, size_t *triangle_count, bool *has_materials) {
     *vertex_count = *triangle_count = 0;
+    *has_materials = false;
     while (next_line(&reader)) {
         if (!next_token(&reader))
             continue;
         if (strcmp(reader.token, "v") == 0) {
             ++*vertex_count;
+        } else if (strcmp(reader.token, "usemtl") == 0) {
+            *has_materials = true;
         } else if (strcmp(reader.token, "f") == 0) {
             size_t corners = 0;
             while (next_token(&reader))
@@ -204,10 +248,11 @@ bool mesh_parse_obj(const char *name, const char *text, size_t size, Mesh *mesh,
     Reader reader = {
         .name = name, .next = text + (marked ? 3 : 0), .end = text + size, .mesh = mesh, .err = err};
     size_t vertex_count, triangle_count;
-    count_records(reader, &vertex_count, &triangle_count);
+    bool has_materials;
+    count_records(reader, &vertex_count, &triangle_count, &has_materials);
     if (!mesh_allocate(mesh, name, vertex_count, triangle_count, err))
         return false;
-    if (!read_records(&reader)) {
+    if ((has_materials && !allocate_materials(mesh, triangle_count, name, err)) || !read_records(&reader)) {
         mesh_free(mesh);
         return false;
     }

@@ -345,10 +345,27 @@ float mesh_distance(const Mesh *mesh, const float point[3], float closest[3]) {
     return signed_distance(mesh, &hit);
 }
 
+float mesh_distance_gradient(const Mesh *mesh, const float point[3], float gradient[3]) {
+    assert(mesh->tree);
+    double p[3], direction[3];
+    dvec_from_float(p, point);
+    Hit hit = {.distance_sq = INFINITY};
+    search(mesh, p, &hit);
+    const float distance = signed_distance(mesh, &hit);
+    const double extent = fmax(fmax(fabs(p[0]), fabs(p[1])), fabs(p[2]));
+    if (hit.distance_sq > 1e-16 * extent * extent)
+        dvec_add_scaled(direction, (const double[3]){0, 0, 0}, distance < 0.0f ? 1.0 : -1.0, hit.closest);
+    else
+        pseudo_normal(mesh, &hit, direction);
+    dvec_normalize(direction);
+    dvec_to_float(gradient, direction);
+    return distance;
+}
+
 /* Points of a batch are near each other as a rule, so the distance to the last point's triangle is a good
  * bound. It is widened, so that the search still meets the triangle that a search without a bound settles on:
  * the values are the same. */
-static void query_batch(const Mesh *mesh, const float (*points)[3], uint32_t count, float *distances) {
+static void query_batch(const Mesh *mesh, const float (*points)[4], uint32_t count, float *distances) {
     uint32_t last = mesh->tree->order[0];
     for (uint32_t i = 0; i < count; i++) {
         double p[3];
@@ -362,12 +379,11 @@ static void query_batch(const Mesh *mesh, const float (*points)[3], uint32_t cou
     }
 }
 
-void mesh_distances(const Mesh *mesh, const float (*points)[3], uint32_t count, float *distances) {
+void mesh_distances(const Mesh *mesh, const float (*points)[4], uint32_t count, float *distances,
+                    int threads) {
     assert(mesh->tree);
     int64_t batches = ((int64_t)count + BATCH - 1) / BATCH;
-#if defined(_OPENMP)
-#pragma omp parallel for schedule(static)
-#endif
+#pragma omp parallel for schedule(static) num_threads(threads)
     for (int64_t b = 0; b < batches; b++) {
         uint32_t first = (uint32_t)b * BATCH, left = count - first;
         query_batch(mesh, points + first, left < BATCH ? left : BATCH, distances + first);

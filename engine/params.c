@@ -108,7 +108,14 @@ SkiffDef skiff_def_default(void) {
 }
 
 SkiffGeometryDef skiff_geometry_default(void) {
-    return (SkiffGeometryDef){.size = {1, 1, 1}, .radius = 1, .scale = {1, 1, 1}, .rotation_axis = {0, 1, 0}};
+    return (SkiffGeometryDef){.size = {1, 1, 1},
+                              .radius = 1,
+                              .inner_radius = 0.5f,
+                              .top_radius = 0.5f,
+                              .height = 1,
+                              .branches = 5,
+                              .scale = {1, 1, 1},
+                              .rotation_axis = {0, 1, 0}};
 }
 
 SkiffBlockDef skiff_block_default(void) {

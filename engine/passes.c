@@ -168,6 +168,9 @@ static int search(const SearchJob *job, uint32_t block, int thread, Scratch *scr
         for (uint32_t l = 0; l < SLICE && first + l < job->count; l++) {
             const uint32_t i = first + l;
             bool fits = true;
+            job->neighbours[i] = 0;
+            if (job->frozen != NULL && job->frozen[i])
+                continue;
             if (job->cell[i] != current_cell) {
                 current_cell = job->cell[i];
                 fits = gather_candidates(job, current_cell, scratch, &candidates);
@@ -298,6 +301,8 @@ static int boundary(const BoundaryJob *job, uint32_t block, Scratch *scratch, ui
     int contact_count = 0;
     const uint32_t begin = block * BLOCK, end = begin + BLOCK < job->count ? begin + BLOCK : job->count;
     for (uint32_t i = begin; i < end; i++) {
+        if (job->frozen != NULL && job->frozen[i])
+            continue;
         ContactSums sums;
         sums.count = 0;
         for (int k = 0; k < 2; k++) {

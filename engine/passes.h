@@ -121,6 +121,7 @@ typedef struct SearchJob {
     bool wide;
     uint8_t *entries;
     int16_t *weights;
+    const uint8_t *frozen; /* NULL, or [particles] 1: gets no row, and density and gradient sum of none */
     uint32_t *slice_start;
     uint16_t *slice_length;
     float *density;
@@ -134,6 +135,7 @@ typedef struct BoundaryJob {
     const SampleSet *sets[2]; /* walls, bodies */
     const Float4 *position;
     const Float4 *centres; /* of every object */
+    const uint8_t *frozen; /* NULL, or [particles] 1: left out */
     uint32_t count;
     Kernel kernel;
     float gradient_unit;

@@ -29,7 +29,7 @@ static bool probe_object(const SkiffSim *sim, const SkiffProbeDef *def, const ch
     }
     if (strcmp(def->object, "tank") == 0) {
         *object = 0;
-        return sim->tank.triangle_count != 0 || err_add(err, ERR_INPUT, "%s.object: there is no tank", path);
+        return sim->tank.kind != SKIFF_GEOMETRY_NONE || err_add(err, ERR_INPUT, "%s.object: there is no tank", path);
     }
     for (int b = 0; b < sim->body_count; b++)
         if (strcmp(def->object, sim->bodies[b].name) == 0)
@@ -226,7 +226,7 @@ static double read_height(const SkiffSim *sim, const Probe *probe) {
         return 0.0;
     /* the line ends at the tank's floor: water shows no further than the wall's surface */
     gauge.low = low - h;
-    if (sim->tank.triangle_count != 0)
+    if (sim->tank.kind != SKIFF_GEOMETRY_NONE)
         gauge.low = fmax(gauge.low, (double)sim->tank.min[1]);
     gauge.count = (int)fmin(ceil((high + h - gauge.low) / gauge.step) + 1, GAUGE_POINTS);
     for (uint32_t i = 0; i < particles->count; i++)

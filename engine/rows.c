@@ -66,20 +66,21 @@ static int rows_search(Rows *rows, const Passes *passes, const SearchJob *job, i
     return status;
 }
 
-bool rows_build(Rows *rows, const Passes *passes, const Grid *grid, const Particles *particles,
-                const Kernel *kernel, float volume, int threads, Err *err) {
+bool rows_build(Rows *rows, const RowsJob *build, Err *err) {
+    const Particles *particles = build->particles;
     for (;;) {
-        if (!rows_reserve(rows, particles, threads, err))
+        if (!rows_reserve(rows, particles, build->threads, err))
             return false;
         rows->neighbours = rows->neighbour_counts.data;
-        const SearchJob job = {.grid = &grid->cells,
-                               .cell = grid->cell,
+        const SearchJob job = {.grid = &build->grid->cells,
+                               .cell = build->grid->cell,
                                .position = (const Float4 *)particles->position,
                                .count = particles->count,
-                               .kernel = *kernel,
-                               .volume = volume,
+                               .kernel = *build->kernel,
+                               .volume = build->volume,
                                .wide = rows->wide,
                                .entries = rows->pool.data,
+                               .frozen = build->frozen,
                                .weights = rows->weights.data,
                                .slice_start = rows->slice_start.data,
                                .slice_length = rows->slice_length.data,
@@ -89,7 +90,7 @@ bool rows_build(Rows *rows, const Passes *passes, const Grid *grid, const Partic
                                .allocate = rows_allocate,
                                .rows = rows};
         uint32_t fault;
-        const int status = rows_search(rows, passes, &job, threads, &fault);
+        const int status = rows_search(rows, build->passes, &job, build->threads, &fault);
         if (status & SEARCH_TOO_DENSE)
             return err_set(
                 err, ERR_DIVERGED,
@@ -101,18 +102,19 @@ bool rows_build(Rows *rows, const Passes *passes, const Grid *grid, const Partic
         if (status & SEARCH_NEEDS_WIDE)
             rows->wide = true;
         if (status == SEARCH_OK) {
-            rows->pairs = (PairData){.count = job.count,
-                                     .kernel = *kernel,
-                                     .volume = volume,
-                                     .gradient_unit = volume * kernel->gradient_scale / (3.0f * 32767.0f),
-                                     .wide = rows->wide,
-                                     .entries = job.entries,
-                                     .weights = job.weights,
-                                     .slice_start = job.slice_start,
-                                     .slice_length = job.slice_length,
-                                     .position = job.position,
-                                     .density = job.density,
-                                     .gradient_sum = (const Float4 *)job.gradient_sum};
+            rows->pairs =
+                (PairData){.count = job.count,
+                           .kernel = *build->kernel,
+                           .volume = build->volume,
+                           .gradient_unit = build->volume * build->kernel->gradient_scale / (3.0f * 32767.0f),
+                           .wide = rows->wide,
+                           .entries = job.entries,
+                           .weights = job.weights,
+                           .slice_start = job.slice_start,
+                           .slice_length = job.slice_length,
+                           .position = job.position,
+                           .density = job.density,
+                           .gradient_sum = (const Float4 *)job.gradient_sum};
             return true;
         }
     }

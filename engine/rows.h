@@ -27,9 +27,18 @@ typedef struct Rows {
 
 /* Neighbours, densities (fluid part) and gradient sums (fluid part, fixed-point units) of the sorted
  * particles. Grows the pool when it is too small, and turns to wide entries when offsets do not fit: both
- * happen in the first steps or never. */
-bool rows_build(Rows *rows, const Passes *passes, const Grid *grid, const Particles *particles,
-                const Kernel *kernel, float volume, int threads, Err *err);
+ * happen in the first steps or never. `frozen` (NULL: none) marks particles that others see but that get no
+ * row. */
+typedef struct RowsJob {
+    const Passes *passes;
+    const Grid *grid;
+    const Particles *particles;
+    const Kernel *kernel;
+    float volume;          /* m^3, of a particle */
+    const uint8_t *frozen; /* [particles] or NULL */
+    int threads;
+} RowsJob;
+bool rows_build(Rows *rows, const RowsJob *job, Err *err);
 void rows_free(Rows *rows);
 Scratch *rows_scratch(Rows *rows, int thread);
 size_t rows_entry_size(bool wide);

@@ -16,7 +16,9 @@ enum { BYTES_PER_PARTICLE = 800 };
 
 /* ---- Machine ---- */
 
-static int default_threads(void) {
+int sim_threads(int wanted) {
+    if (wanted > 0)
+        return wanted;
     /* hyper-threads share the units that the passes keep busy: one thread a core */
     int cores = 0;
     const int cpus = omp_get_num_procs();
@@ -31,7 +33,8 @@ static int default_threads(void) {
             cores++;
         fclose(file);
     }
-    return cores > 0 && cores < cpus ? cores : cpus;
+    cores = cores > 0 && cores < cpus ? cores : cpus;
+    return cores < ROWS_MAX_THREADS ? cores : ROWS_MAX_THREADS;
 }
 
 static bool simd_available(SkiffSimd simd) {
@@ -63,9 +66,7 @@ static bool choose_passes(SkiffSim *sim, const SkiffDef *def, Err *err) {
     if (def->threads < 0 || def->threads > ROWS_MAX_THREADS)
         return err_add(err, ERR_USAGE, "threads: %d is out of range, allowed is 0 to %d", def->threads,
                        ROWS_MAX_THREADS);
-    sim->threads = def->threads > 0 ? def->threads : default_threads();
-    if (sim->threads > ROWS_MAX_THREADS)
-        sim->threads = ROWS_MAX_THREADS;
+    sim->threads = sim_threads(def->threads);
     return true;
 }
 
@@ -135,16 +136,10 @@ static bool make_tank(SkiffSim *sim, const SkiffDef *def, Err *err) {
         return true;
     if (isnan(tank->wet_height))
         return err_add(err, ERR_INPUT, "Tank.wetHeight: must be a number");
-    Mesh *mesh = &sim->tank;
-    if (!geometry_make(&tank->geometry, "Tank", mesh, err))
+    if (!shape_make(&tank->geometry, "Tank", sim->origin, &sim->tank, err))
         return false;
-    float shift[3];
-    for (int k = 0; k < 3; k++)
-        shift[k] = (float)((double)tank->geometry.translation[k] - sim->origin[k]);
-    mesh_transform(mesh, (const float[3]){1, 1, 1}, (const float[4]){0, 0, 0, 1}, shift);
+    const Mesh *mesh = &sim->tank.mesh;
     sim->tank_open = tank->open;
-    if (!mesh_build_tree(mesh, err))
-        return false;
     /* the lid of an open tank lies on the bounds: cutting just below leaves it out */
     SampleRegion region = {{-INFINITY, -INFINITY, -INFINITY}, {INFINITY, INFINITY, INFINITY}};
     const float spacing = def->params.boundary_spacing * def->params.particle_radius;
@@ -240,7 +235,7 @@ static bool check_overlaps(const SkiffSim *sim, Err *err) {
                                "RigidBodies[%d]: overlaps RigidBodies[%d] by %.3g m (allowed: %.3g m)", a, b,
                                depth, tolerance);
         }
-        if (sim->tank.triangle_count == 0)
+        if (sim->tank.kind == SKIFF_GEOMETRY_NONE)
             continue;
         const Body *body = &sim->bodies[a];
         double worst = -INFINITY;
@@ -250,7 +245,7 @@ static bool check_overlaps(const SkiffSim *sim, Err *err) {
                 p[k] = (float)((double)body->mesh.vertices[v][k] + body->position[k] - sim->origin[k]);
             if (sim->tank_open)
                 p[1] = fminf(p[1], sim->tank.max[1] - sim->params.particle_radius);
-            worst = fmax(worst, (double)mesh_distance(&sim->tank, p, NULL));
+            worst = fmax(worst, (double)shape_distance(&sim->tank, p, NULL));
         }
         if (worst > tolerance)
             good = err_add(err, ERR_INPUT,
@@ -283,7 +278,7 @@ static bool choose_domain(SkiffSim *sim, const SkiffDef *def, Err *err) {
         return good;
     }
     *domain = (GridBounds){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-    if (sim->tank.triangle_count != 0) {
+    if (sim->tank.kind != SKIFF_GEOMETRY_NONE) {
         grow_bounds(domain, sim->tank.min);
         grow_bounds(domain, sim->tank.max);
     }
@@ -298,7 +293,7 @@ static bool choose_domain(SkiffSim *sim, const SkiffDef *def, Err *err) {
     }
     if (!(domain->min[0] <= domain->max[0]))
         *domain = (GridBounds){{-1, -1, -1}, {1, 1, 1}};
-    const float grow = sim->tank.triangle_count != 0 ? 4.0f * sim->kernel.support : 10.0f;
+    const float grow = sim->tank.kind != SKIFF_GEOMETRY_NONE ? 4.0f * sim->kernel.support : 10.0f;
     for (int k = 0; k < 3; k++) {
         domain->min[k] -= grow;
         domain->max[k] += grow;
@@ -403,7 +398,7 @@ void skiff_destroy(SkiffSim *sim) {
         body_free(&sim->bodies[b]);
     free(sim->bodies);
     free(sim->blocks);
-    mesh_free(&sim->tank);
+    shape_free(&sim->tank);
     particles_free(&sim->particles);
     grid_free(&sim->grid);
     rows_free(&sim->rows);

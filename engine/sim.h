@@ -3,6 +3,7 @@
 #define SKIFF_SIM_H
 
 #include "dfsph.h"
+#include "shape.h"
 
 typedef struct EmitBlock {
     SkiffBlockDef def;
@@ -33,7 +34,7 @@ struct SkiffSim {
     uint64_t def_hash; /* of everything a state must agree with */
     EmitBlock *blocks;
     int block_count;
-    Mesh tank; /* window-local; no triangles: no tank */
+    Shape tank; /* window-local; the fluid is inside */
     bool tank_open;
     Body *bodies;
     int body_count;
@@ -76,5 +77,8 @@ bool probes_make(SkiffSim *sim, const SkiffDef *def, Err *err);
 void probes_free(SkiffSim *sim);
 
 double timer_ms(void);
+
+/* `wanted`, or when that is 0 the number of physical cores this process may use. */
+int sim_threads(int wanted);
 
 #endif

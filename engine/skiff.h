@@ -64,15 +64,25 @@ typedef enum SkiffGeometryKind {
     SKIFF_GEOMETRY_MESH,
     SKIFF_GEOMETRY_BOX,
     SKIFF_GEOMETRY_SPHERE,
-    SKIFF_GEOMETRY_PLANES
+    SKIFF_GEOMETRY_PLANES,
+    SKIFF_GEOMETRY_CYLINDER,
+    SKIFF_GEOMETRY_STAR,
+    SKIFF_GEOMETRY_CONE
 } SkiffGeometryKind;
 
-/* Own frame -> world: scale, rotate about `rotation_axis` by `rotation_angle` (rad), translate. */
+enum { SKIFF_MAX_BRANCHES = 64 }; /* of a star */
+
+/* Own frame -> world: scale, rotate about `rotation_axis` by `rotation_angle` (rad), translate. Everything
+ * but meshes and planes is centred on its own origin; cylinders, stars and cones stand upright. */
 typedef struct SkiffGeometryDef {
     SkiffGeometryKind kind;
     const char *file;               /* mesh: OBJ file, closed */
-    float size[3];                  /* box: edge lengths, centred on the origin, m */
-    float radius;                   /* sphere, centred on the origin, m */
+    float size[3];                  /* box: edge lengths, m */
+    float radius;                   /* m; sphere, cylinder; star: of its tips; cone: at the bottom */
+    float inner_radius;             /* star: of the corners between tips, above 0 and up to radius, m */
+    float top_radius;               /* cone: at the top, 0 for a tip, may exceed radius, m */
+    float height;                   /* cylinder, star, cone, m */
+    int branches;                   /* star: 2 to SKIFF_MAX_BRANCHES; the first points towards +z */
     const float (*plane_points)[3]; /* planes: convex region (p - point) . normal <= 0; normals point out */
     const float (*plane_normals)[3];
     int plane_count;
@@ -85,7 +95,7 @@ typedef struct SkiffGeometryDef {
 /* The walls around the fluid: the inside of a closed geometry. */
 typedef struct SkiffTankDef {
     SkiffGeometryDef geometry; /* kind NONE: no tank */
-    bool open;                 /* boxes: no lid */
+    bool open;                 /* no lid */
     float wet_height;          /* only walls below this y are sampled, m; INFINITY: all */
 } SkiffTankDef;
 
@@ -231,6 +241,15 @@ void skiff_body_push(SkiffSim *sim, int index, const double force[3], const doub
  * world. Owned by the simulation. */
 void skiff_body_mesh(const SkiffSim *sim, int index, const float (**vertices)[3], uint32_t *vertex_count,
                      const uint32_t (**triangles)[3], uint32_t *triangle_count);
+/* The material of each of these triangles, as an index, and the name of each material (from the OBJ file's
+ * usemtl records). NULL: no materials. Owned by the simulation. */
+const uint8_t *skiff_body_materials(const SkiffSim *sim, int index);
+/* "" past the last one, and for faces before the first record. */
+const char *skiff_body_material_name(const SkiffSim *sim, int index, int material);
+
+/* The surface of the tank, window-local; no triangles where there is none. Owned by the simulation. */
+void skiff_tank_mesh(const SkiffSim *sim, const float (**vertices)[3], uint32_t *vertex_count,
+                     const uint32_t (**triangles)[3], uint32_t *triangle_count);
 
 enum {
 #define PHASE(id, key, label) SKIFF_PHASE_##id,
@@ -283,6 +302,55 @@ bool skiff_save(const SkiffSim *sim, const char *path, Err *err);
 /* Replaces the state of a simulation made from the same def. ERR_INPUT when the file is damaged or belongs to
  * another def; sim is then unchanged. */
 bool skiff_load(SkiffSim *sim, const char *path, Err *err);
+
+/* ---- Water at rest: what shapes are filled from ---- */
+
+/* Points of water at rest, in units of the particle radius: a periodic tile, which fills boxes of any size,
+ * or a block cut out of a simulation, which ends at its faces. skiff_tile_destroy ends any of them. */
+typedef struct SkiffTile SkiffTile;
+
+typedef struct SkiffTileDef {
+    double
+        edge; /* of the cube to begin with, d: 6 to 64; scaling to rest density changes it by about 0.1 % */
+    double volume_factor; /* volume of a particle, d^3 */
+    uint64_t seed;
+    int iterations; /* at most; the relaxation ends sooner when nothing moves any more */
+    int threads;    /* 0: as SkiffDef.threads; the result does not depend on it */
+} SkiffTileDef;
+
+typedef struct SkiffTileInfo {
+    uint32_t count;
+    bool periodic;
+    double size[3]; /* of the box, r */
+    double volume_factor;
+} SkiffTileInfo;
+
+typedef struct SkiffTileQuality {
+    uint32_t count; /* points measured: all of a tile, those of a block farther than 4 r from its faces */
+    double number_density;                                     /* particles per d^3 */
+    double density_mean, density_sd, density_min, density_max; /* rho / rho0 */
+    double gradient_rms, gradient_max;                         /* h |sum V grad W|: 0 for perfect symmetry */
+    double force_rms, force_max;      /* h |sum V (s_i + s_j) / 2 grad W|, s the pressure shares: what of the
+                                         former      these leave unbalanced */
+    double share_sd;                  /* of s, whose mean is 1 */
+    double anisotropy;                /* largest entry of 3 sum W d d^T / sum W d^2 - I */
+    double nearest_min, nearest_mean; /* distance to the nearest point, d */
+} SkiffTileQuality;
+
+/* edge 12 d (2171 points), volume factor 0.8 */
+SkiffTileDef skiff_tile_def_default(void);
+/* A periodic tile of random points, relaxed to rest. NULL with ERR_INPUT: a setting out of range, or not at
+ * rest within `iterations`. */
+SkiffTile *skiff_tile_make(const SkiffTileDef *def, Err *err);
+/* The particles inside [min, max] (m, world) as a block. NULL with ERR_INPUT: none is, or the box is too
+ * small for a particle with all its neighbours. */
+SkiffTile *skiff_tile_cut(const SkiffSim *sim, const double min[3], const double max[3], Err *err);
+/* Reads a file; path NULL: the tile that comes with the program. NULL with ERR_INPUT or ERR_IO. */
+SkiffTile *skiff_tile_open(const char *path, Err *err);
+bool skiff_tile_save(const SkiffTile *tile, const char *path, Err *err);
+SkiffTileInfo skiff_tile_info(const SkiffTile *tile);
+bool skiff_tile_measure(const SkiffTile *tile, SkiffTileQuality *quality, Err *err);
+void skiff_tile_destroy(SkiffTile *tile);
 
 #ifdef __cplusplus
 }

@@ -29,6 +29,7 @@ static DfsphProblem step_problem(SkiffSim *sim) {
                           .bodies = sim->bodies,
                           .body_count = sim->body_count,
                           .particles = &sim->particles,
+                          .evaluated_count = sim->particles.count,
                           .threads = sim->threads};
 }
 
@@ -48,13 +49,23 @@ static bool sort_particles(SkiffSim *sim, Err *err) {
                      remove ? &sim->stats.removed : NULL, sim->threads, err);
 }
 
+static RowsJob rows_job(SkiffSim *sim) {
+    return (RowsJob){.passes = sim->passes,
+                     .grid = &sim->grid,
+                     .particles = &sim->particles,
+                     .kernel = &sim->kernel,
+                     .volume = sim->volume,
+                     .threads = sim->threads};
+}
+
 static bool find_neighbours(SkiffSim *sim, Err *err) {
-    return rows_build(&sim->rows, sim->passes, &sim->grid, &sim->particles, &sim->kernel, sim->volume,
-                      sim->threads, err);
+    const RowsJob job = rows_job(sim);
+    return rows_build(&sim->rows, &job, err);
 }
 
 static bool add_boundary(SkiffSim *sim, Err *err) {
-    return boundary_apply(&sim->boundary, &sim->rows, sim->passes, &sim->particles, sim->threads, err);
+    const RowsJob job = rows_job(sim);
+    return boundary_apply(&sim->boundary, &sim->rows, &job, err);
 }
 
 static void solve_divergence(SkiffSim *sim) {

@@ -42,7 +42,7 @@ GfxCameraDef gfx_camera_default(GfxCameraKind kind) {
 }
 
 /* v + 2 q x (q x v + w v) */
-static void rotate(const double q[4], const double v[3], double out[3]) {
+void gfx_camera_rotate(const double q[4], const double v[3], double out[3]) {
     double t[3] = {q[1] * v[2] - q[2] * v[1] + q[3] * v[0], q[2] * v[0] - q[0] * v[2] + q[3] * v[1],
                    q[0] * v[1] - q[1] * v[0] + q[3] * v[2]};
     double u[3] = {v[0] + 2 * (q[1] * t[2] - q[2] * t[1]), v[1] + 2 * (q[2] * t[0] - q[0] * t[2]),
@@ -75,7 +75,7 @@ static void spring_move(GfxSpring *spring, double goal, double dt, double smooth
  */
 static double heading_of(const GfxCameraDef *def, const GfxPose *pose, double last) {
     double bow[3];
-    rotate(pose->rotation, def->forward, bow);
+    gfx_camera_rotate(pose->rotation, def->forward, bow);
     if (hypot(bow[0], bow[2]) < 1e-6 * fabs(bow[1]))
         return last;
     double angle = atan2(bow[2], bow[0]);
@@ -84,7 +84,7 @@ static double heading_of(const GfxCameraDef *def, const GfxPose *pose, double la
 
 static void follow(const GfxCameraDef *def, GfxCameraState *state, const GfxPose *pose, double time) {
     double heading = heading_of(def, pose, state->heading.goal);
-    if (!state->is_started) {
+    if (state->updates == 0) {
         for (int k = 0; k < 3; k++)
             spring_start(&state->position[k], pose->position[k]);
         spring_start(&state->heading, heading);
@@ -94,7 +94,7 @@ static void follow(const GfxCameraDef *def, GfxCameraState *state, const GfxPose
             spring_move(&state->position[k], pose->position[k], dt, def->smoothing);
         spring_move(&state->heading, heading, dt, def->smoothing);
     }
-    state->is_started = true;
+    state->updates += 1;
     state->time = time;
 }
 
@@ -114,9 +114,9 @@ static void look_from(const GfxCameraDef *def, const double centre[3], double an
 static void look_on_board(const GfxCameraDef *def, const GfxPose *pose, GfxCameraView *view) {
     double eye[3], bow[3];
     const double vertical[3] = {0, 1, 0};
-    rotate(pose->rotation, def->eye, eye);
-    rotate(pose->rotation, def->forward, bow);
-    rotate(pose->rotation, vertical, view->up);
+    gfx_camera_rotate(pose->rotation, def->eye, eye);
+    gfx_camera_rotate(pose->rotation, def->forward, bow);
+    gfx_camera_rotate(pose->rotation, vertical, view->up);
     double length = sqrt(bow[0] * bow[0] + bow[1] * bow[1] + bow[2] * bow[2]);
     for (int k = 0; k < 3; k++) {
         view->eye[k] = pose->position[k] + eye[k];
@@ -158,4 +158,23 @@ GfxCameraView gfx_camera_update(const GfxCameraDef *def, GfxCameraState *state, 
         break;
     }
     return view;
+}
+
+static double dot(const double a[3], const double b[3]) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* Each corner must lie inside the pyramid of sight: at a depth of its distance across over the slope. */
+double gfx_camera_fit(const double half[3], const double from[3], double fov_deg, double aspect) {
+    const double flat = hypot(from[0], from[2]);
+    const double right[3] = {from[2] / flat, 0, -from[0] / flat};
+    const double up[3] = {-from[1] * from[0] / flat, flat, -from[1] * from[2] / flat};
+    double slope = tan(0.5 * fov_deg * pi / 180), distance = 0;
+    for (int c = 0; c < 8; c++) {
+        const double corner[3] = {c & 1 ? half[0] : -half[0], c & 2 ? half[1] : -half[1],
+                                  c & 4 ? half[2] : -half[2]};
+        double across = fmax(fabs(dot(corner, right)) / aspect, fabs(dot(corner, up)));
+        distance = fmax(distance, dot(corner, from) + across / slope);
+    }
+    return distance;
 }

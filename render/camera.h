@@ -51,10 +51,10 @@ typedef struct GfxSpring {
     double value, rate, goal;
 } GfxSpring;
 
-/* Zero-initialise before the first update. Plain data: copying it keeps the camera's state. */
+/* Zero-initialise before the first update. Only doubles, so that it can be kept in a file as it is. */
 typedef struct GfxCameraState {
-    bool is_started;
-    double time;           /* s, of the last update */
+    double updates;        /* so far */
+    double time;           /* s, of the last one */
     GfxSpring position[3]; /* of the followed body, smoothed */
     GfxSpring heading;     /* rad, unwrapped, from +x towards +z */
 } GfxCameraState;
@@ -63,5 +63,12 @@ typedef struct GfxCameraState {
  * is followed. The first update starts at rest at the goal. */
 GfxCameraView gfx_camera_update(const GfxCameraDef *def, GfxCameraState *state, const GfxPose *pose,
                                 double time);
+
+/* From how far away a box of these half lengths (m) just fits into the picture. `from`: unit vector from its
+ * centre towards the eye, not vertical; `aspect`: width over height of the picture. */
+double gfx_camera_fit(const double half[3], const double from[3], double fov_deg, double aspect);
+
+/* A vector turned by a unit quaternion x y z w. out may be v. */
+void gfx_camera_rotate(const double q[4], const double v[3], double out[3]);
 
 #endif

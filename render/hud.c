@@ -104,7 +104,7 @@ static void group_digits(double value, char *out, size_t size) {
 
 /* ---- Time and counts ---- */
 
-enum { LINES = 4, LINE_SIZE = 64 };
+enum { LINES = 3, LINE_SIZE = 64 };
 
 static void draw_counts(const Canvas *canvas, const GfxHudValues *values) {
     char lines[LINES][LINE_SIZE], clock[LINE_SIZE] = "";
@@ -119,8 +119,6 @@ static void draw_counts(const Canvas *canvas, const GfxHudValues *values) {
                  values->moves == 1 ? "" : "s");
     if (!isnan(values->step_ms))
         snprintf(lines[count++], LINE_SIZE, "%.1f ms a step", values->step_ms);
-    if (values->camera)
-        snprintf(lines[count++], LINE_SIZE, "camera %.40s", values->camera);
     if (!isnan(values->time))
         snprintf(clock, sizeof clock, "%.2f s", values->time);
     if (count == 0 && !*clock)
@@ -186,7 +184,8 @@ static void draw_dash(const Canvas *canvas, const GfxHudValues *values) {
     float width = (speed ? speed_width : 0) + (throttle ? throttle_width : 0) + (rudder ? rudder_width : 0);
     if (width == 0)
         return;
-    float x = margin, y = 720 - margin - dash_height;
+    float all = (float)canvas->image.width / canvas->unit;
+    float x = values->has_legend ? 0.5f * (all - width - padding) : margin, y = 720 - margin - dash_height;
     box(canvas, x, y, width + padding, dash_height, corner, plate_ink);
     x += padding;
     y += padding;

@@ -4,16 +4,18 @@
 
 #include "text.h"
 
+#include <stdbool.h>
+
 /* What is shown. A number that is NaN, a negative count and a NULL text are left out. */
 typedef struct GfxHudValues {
     double time;             /* s */
     double speed;            /* m/s, of the boat over ground */
     double throttle, rudder; /* -1..1; rudder: positive to starboard */
     const char *keys;        /* names of the pressed keys, separated by blanks; "": none is pressed */
-    const char *camera;      /* its name */
     double particles;        /* number of */
     long moves;              /* of the window, so far */
-    double step_ms; /* wall time of a step: differs between runs, and with it the bytes of the picture */
+    bool has_legend; /* a legend takes the lower left corner: speed, throttle and rudder are centred */
+    double step_ms;  /* wall time of a step: differs between runs, and with it the bytes of the picture */
 } GfxHudValues;
 
 GfxHudValues gfx_hud_nothing(void);

@@ -166,6 +166,14 @@ static void a_vertical_bow_keeps_the_course(void **unused) {
     assert_true(fabs(state.heading.value - 1) < 1e-9);
 }
 
+static void a_box_that_fits_touches_the_frame(void **unused) {
+    (void)unused;
+    /* Seen along z from d: a face of half height 1 at depth d - 2 spans a view of 90 degrees. */
+    const double from[3] = {0, 0, 1}, box[3] = {1, 1, 2}, wide[3] = {4, 1, 2};
+    assert_true(fabs(gfx_camera_fit(box, from, 90, 2) - 3) < 1e-12);
+    assert_true(fabs(gfx_camera_fit(wide, from, 90, 2) - 4) < 1e-12); /* 4 / 2: the width decides */
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(chase_starts_astern),
@@ -177,6 +185,7 @@ int main(void) {
         cmocka_unit_test(rolling_does_not_shake_the_chase),
         cmocka_unit_test(other_kinds),
         cmocka_unit_test(a_vertical_bow_keeps_the_course),
+        cmocka_unit_test(a_box_that_fits_touches_the_frame),
     };
     return cmocka_run_group_tests_name("camera", tests, NULL, NULL);
 }

@@ -89,6 +89,33 @@ static void test_obj_forms(void **state) {
     }
 }
 
+static void test_obj_materials(void **state) {
+    (void)state;
+    /* the second triangle collapses when its corners are merged: the materials of the others stay theirs */
+    Mesh mesh =
+        parse_good("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 0\nf 1 2 3\nusemtl red # paint\nf 1 5 2\n"
+                   "usemtl Glass.001\nf 2 4 3\nusemtl red\nf 3 4 1\nusemtl unused\n");
+    static const uint8_t expected[3] = {0, 2, 1};
+    static const char *const names[4] = {"", "red", "Glass.001", "unused"};
+    assert_int_equal(mesh.triangle_count, 3);
+    assert_int_equal(mesh.material_count, 4);
+    assert_memory_equal(mesh.materials, expected, sizeof expected);
+    for (int i = 0; i < 4; i++)
+        assert_string_equal(mesh.material_names[i], names[i]);
+    mesh_free(&mesh);
+    mesh = parse_good(cube_text);
+    assert_null(mesh.materials);
+    mesh_free(&mesh);
+
+    char text[8192] = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+    for (int i = 0; i < MESH_MAX_MATERIALS + 1; i++)
+        snprintf(text + strlen(text), sizeof text - strlen(text), "usemtl m%d\nf 1 2 3\n", i);
+    Err err = {0};
+    assert_false(parse(text, strlen(text), &mesh, &err));
+    assert_string_equal(err.message, "x.obj:516: material 'm256' is one more than the 256 allowed");
+    mesh_free(&mesh);
+}
+
 static void test_obj_faults(void **state) {
     (void)state;
     static const struct {
@@ -117,6 +144,9 @@ static void test_obj_faults(void **state) {
         {"v 0 0 0\nf 1 2 99999999999999999999999\n",
          "x.obj:2: vertex index of corner '2' is out of range; 1..1"},
         {"v 0 0 0\nv 1 0 0\nf 1 2 99999999999999999999999\n", "is out of range"},
+        {"usemtl\nf 1 2 3\n", "x.obj:1: usemtl '': a name of 1 to 31 characters is needed"},
+        {"usemtl 12345678901234567890123456789012\nf 1 2 3\n",
+         "x.obj:1: usemtl '12345678901234567890123456789012': a name of 1 to 31 characters is needed"},
         {"f 1 2 3\n", "x.obj:1: vertex index 1; the file has no vertices"},
         {"v 0 0 0\nf 0 1 1\n", "x.obj:2: face corner '0' is none of"},
         {"v 0 0 0\nf 1/ 1 1\n", "x.obj:2: face corner '1/' is none of"},
@@ -166,7 +196,7 @@ static void test_obj_file(void **state) {
 static void test_obj_fuzz(void **state) {
     (void)state;
     static const char seed[] =
-        "v 0 0 0\nv 1 0 0 1\nv 0 1e0 0\r\nv 0 0 -1.5 # c\nvt 0 0\nf 1/1 3/1/2 2//1\nf -4 4 3\n"
+        "v 0 0 0\nv 1 0 0 1\nv 0 1e0 0\r\nv 0 0 -1.5 # c\nvt 0 0\nf 1/1 3/1/2 2//1\nusemtl a\nf -4 4 3\n"
         "f 1 2 4\nf 2 3 4\nf 1 3 4 2\n";
     static const char bytes[] = "0123456789+-.eE/ \t\r\n#vfnt\0\xff";
     uint32_t accepted = 0;
@@ -193,6 +223,8 @@ static void test_obj_fuzz(void **state) {
         for (uint32_t t = 0; t < mesh.triangle_count; t++)
             for (int k = 0; k < 3; k++)
                 assert_true(mesh.triangles[t][k] < mesh.vertex_count);
+        for (uint32_t t = 0; mesh.materials && t < mesh.triangle_count; t++)
+            assert_true(mesh.materials[t] < mesh.material_count);
         MeshMass mass;
         mesh_mass(&mesh, &mass);
         assert_true(isfinite(mass.volume) && isfinite(mass.area));
@@ -463,7 +495,7 @@ static double winding_number(const Mesh *mesh, const double p[3]) {
 static void check_distances(Mesh *mesh, uint32_t count) {
     Err err = {0};
     assert_true(mesh_build_tree(mesh, &err));
-    float(*points)[3] = malloc(count * sizeof *points), *batch = malloc(count * sizeof *batch);
+    float(*points)[4] = malloc(count * sizeof *points), *batch = malloc(count * sizeof *batch);
     assert_true(points && batch);
     uint64_t counter = 1;
     uint32_t steep = 0, inside = 0;
@@ -473,7 +505,7 @@ static void check_distances(Mesh *mesh, uint32_t count) {
             double size = (double)mesh->max[k] - (double)mesh->min[k];
             points[i][k] = (float)(centre + (i % 7 == 0 ? 10.0 : 0.9) * size * random_signed(&counter));
         }
-    mesh_distances(mesh, (const float(*)[3])points, count, batch);
+    mesh_distances(mesh, (const float(*)[4])points, count, batch, 2);
     for (uint32_t i = 0; i < count; i++) {
         double p[3] = {(double)points[i][0], (double)points[i][1], (double)points[i][2]};
         float closest[3], distance = mesh_distance(mesh, points[i], closest);
@@ -547,10 +579,10 @@ static void test_distance_ties(void **state) {
                 assert_true(fabs((double)mesh_distance(&mesh, p, NULL) - expected) < 1e-6);
             }
     /* Far away and not a number: an answer, and nothing for the points that follow in the batch. */
-    const float odd[4][3] = {
+    const float odd[4][4] = {
         {1e6f, 0.5f, 0.5f}, {NAN, 0.0f, 0.0f}, {INFINITY, 0.0f, 0.0f}, {0.5f, 0.5f, 0.25f}};
     float distances[4];
-    mesh_distances(&mesh, odd, 4, distances);
+    mesh_distances(&mesh, odd, 4, distances, 1);
     assert_true(distances[0] == 999999.0f);
     assert_true(distances[3] == -0.25f);
     mesh_free(&mesh);
@@ -559,12 +591,12 @@ static void test_distance_ties(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_obj_forms),     cmocka_unit_test(test_obj_faults),
-        cmocka_unit_test(test_obj_file),      cmocka_unit_test(test_obj_fuzz),
-        cmocka_unit_test(test_makers),        cmocka_unit_test(test_planes),
-        cmocka_unit_test(test_closed_faults), cmocka_unit_test(test_transform),
-        cmocka_unit_test(test_mass),          cmocka_unit_test(test_distance),
-        cmocka_unit_test(test_distance_ties),
+        cmocka_unit_test(test_obj_forms),  cmocka_unit_test(test_obj_materials),
+        cmocka_unit_test(test_obj_faults), cmocka_unit_test(test_obj_file),
+        cmocka_unit_test(test_obj_fuzz),   cmocka_unit_test(test_makers),
+        cmocka_unit_test(test_planes),     cmocka_unit_test(test_closed_faults),
+        cmocka_unit_test(test_transform),  cmocka_unit_test(test_mass),
+        cmocka_unit_test(test_distance),   cmocka_unit_test(test_distance_ties),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -48,8 +48,13 @@ static void cloud_make(Cloud *cloud, const Passes *passes, bool wide) {
     const GridBounds domain = {{-5, -5, -5}, {5, 5, 5}};
     cloud->rows.wide = wide;
     assert_true(grid_sort(&cloud->grid, &cloud->particles, 0.1f, &domain, NULL, 1, &err));
-    assert_true(rows_build(&cloud->rows, passes, &cloud->grid, &cloud->particles, &cloud->kernel,
-                           cloud->volume, 1, &err));
+    const RowsJob job = {.passes = passes,
+                         .grid = &cloud->grid,
+                         .particles = &cloud->particles,
+                         .kernel = &cloud->kernel,
+                         .volume = cloud->volume,
+                         .threads = 1};
+    assert_true(rows_build(&cloud->rows, &job, &err));
     assert_int_equal(cloud->rows.wide, wide);
     /* what the boundary pass does when there is no boundary */
     const float unit = cloud->rows.pairs.gradient_unit;
@@ -219,7 +224,13 @@ static void test_crowd(void **state) {
     for (int i = 0; i < 700; i++)
         particles_append(&particles, (const float[3]){1e-4f * (float)i, 0, 0}, (const float[3]){0}, 0.0);
     assert_true(grid_sort(&grid, &particles, 0.1f, &domain, NULL, 1, &err));
-    assert_false(rows_build(&rows, &passes_plain, &grid, &particles, &kernel, 1e-4f, 1, &err));
+    const RowsJob job = {.passes = &passes_plain,
+                         .grid = &grid,
+                         .particles = &particles,
+                         .kernel = &kernel,
+                         .volume = 1e-4f,
+                         .threads = 1};
+    assert_false(rows_build(&rows, &job, &err));
     assert_int_equal(err.code, ERR_DIVERGED);
     assert_non_null(strstr(err.message, "more than 496 neighbours"));
     particles_free(&particles);

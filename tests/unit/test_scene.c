@@ -51,10 +51,10 @@ static const struct {
     {"{\"version\": 1, \"Tnak\": {}}", "s.json: Tnak: unknown key, did you mean Tank?"},
     {"{\"version\": 1, \"Boats\": {}}",
      "s.json: Boats: unknown key, expected one of $schema, version, title, description, Configuration, Tank, "
-     "FluidBlocks, RigidBodies, Probes"},
+     "FluidBlocks, RigidBodies, Probes, Render"},
     {"{\"version\": 1, \"\\u001b[31m\": 1}",
      "s.json: ?[31m: unknown key, expected one of $schema, version, title, description, Configuration, Tank, "
-     "FluidBlocks, RigidBodies, Probes"},
+     "FluidBlocks, RigidBodies, Probes, Render"},
 };
 
 /* Bodies of a scene: `"version": 1` stands before them. */
@@ -97,9 +97,12 @@ static const struct {
      "s.json: Configuration.domainMax[1]: 0 is not above domainMin[1], which is 0"},
 
     {"\"Tank\": []", "s.json: Tank: expected an object or null, found a list of 0"},
-    {"\"Tank\": {}", "s.json: Tank.type: missing, expected one of box, mesh, planes: What the walls are"},
+    {"\"Tank\": {}",
+     "s.json: Tank.type: missing, expected one of box, mesh, planes, sphere, cylinder, star, cone: What the "
+     "walls are"},
     {"\"Tank\": {\"type\": \"bok\"}",
-     "s.json: Tank.type: expected one of box, mesh, planes, found \"bok\"; did you mean box?"},
+     "s.json: Tank.type: expected one of box, mesh, planes, sphere, cylinder, star, cone, found "
+     "\"bok\"; did you mean box?"},
     {"\"Tank\": {\"type\": \"box\", \"min\": [0, 0, 0]}",
      "s.json: Tank.max: missing, expected 3 numbers from -100000 to 100000 m: Corner of the box with the "
      "largest coordinates"},
@@ -121,6 +124,23 @@ static const struct {
     {"\"Tank\": {\"type\": \"planes\", \"planes\": [{\"point\": [0, 0, 0], \"normal\": [0, 0, 0]}]}",
      "s.json: Tank.planes[0].normal: has no direction"},
 
+    {"\"Tank\": {\"type\": \"cylinder\", \"height\": 2}",
+     "s.json: Tank.radius: missing, expected a number from 0.0001 to 100000 m: Of a sphere or cylinder, of a "
+     "star's tips, of a cone's floor"},
+    {"\"Tank\": {\"type\": \"sphere\", \"radius\": 2, \"height\": 2}",
+     "s.json: Tank.height: has no meaning for type \"sphere\", only for \"cylinder\" and \"star\" and "
+     "\"cone\""},
+    {"\"Tank\": {\"type\": \"cone\", \"radius\": 2, \"topRadius\": -1, \"height\": 2}",
+     "s.json: Tank.topRadius: expected a number from 0 to 100000 m, found -1"},
+    {"\"Tank\": {\"type\": \"star\", \"radius\": 2, \"innerRadius\": 3, \"height\": 2}",
+     "s.json: Tank.innerRadius: 3 is above radius, which is 2"},
+    {"\"Tank\": {\"type\": \"star\", \"radius\": 2, \"innerRadius\": 1, \"height\": 2, \"branches\": 65}",
+     "s.json: Tank.branches: expected an integer from 2 to 64, found 65"},
+    {"\"Tank\": {\"type\": \"cone\", \"radius\": 2, \"topRadius\": 3, \"height\": 2, \"rotationAxis\": [1, "
+     "0, "
+     "0], \"rotationAngle\": 1}",
+     "s.json: Tank.open: a tilted tank keeps its lid, expected false"},
+
     {"\"FluidBlocks\": {}",
      "s.json: FluidBlocks: expected a list of at most 100000 objects, found an object"},
     {"\"FluidBlocks\": [7]", "s.json: FluidBlocks[0]: expected an object, found 7"},
@@ -132,13 +152,17 @@ static const struct {
      "s.json: FluidBlocks[0].time: expected a number from 0 to 1000000 s, found -1"},
 
     {"\"RigidBodies\": [{\"name\": \"a\"}]",
-     "s.json: RigidBodies[0]: missing, expected one of geometryFile, box, sphere"},
+     "s.json: RigidBodies[0]: missing, expected one of geometryFile, box, sphere, cylinder, star, cone"},
     {"\"RigidBodies\": [{\"name\": \"a\", \"box\": [1, 1, 1], \"sphere\": 1}]",
-     "s.json: RigidBodies[0]: 2 of geometryFile, box, sphere are given, expected one"},
+     "s.json: RigidBodies[0]: 2 of geometryFile, box, sphere, cylinder, star, cone are given, expected one"},
     {"\"RigidBodies\": [{\"name\": \"a\", \"sphere\": 1, \"mass\": 1, \"density\": 1}]",
      "s.json: RigidBodies[0]: 2 of density, mass are given, expected one"},
     {"\"RigidBodies\": [{\"name\": \"a\", \"sphere\": -1}]",
      "s.json: RigidBodies[0].sphere: expected a number from 0.0001 to 100000 m or null, found -1"},
+    {"\"RigidBodies\": [{\"name\": \"a\", \"star\": {\"radius\": 1, \"innerRadius\": 2, \"height\": 1}}]",
+     "s.json: RigidBodies[0].star.innerRadius: 2 is above radius, which is 1"},
+    {"\"RigidBodies\": [{\"name\": \"a\", \"cylinder\": {\"radius\": 1, \"topRadius\": 1, \"height\": 1}}]",
+     "s.json: RigidBodies[0].cylinder.topRadius: unknown key, did you mean radius?"},
     {"\"RigidBodies\": [{\"name\": \"a b\", \"sphere\": 1}]",
      "s.json: RigidBodies[0].name: expected a name of 1 to 63 letters, digits, _ or -, found \"a b\""},
     {"\"RigidBodies\": [{\"name\": \"a\", \"sphere\": 1, \"density\": 0}]",
@@ -313,6 +337,41 @@ static void bodies_and_probes_reach_the_def(void **state) {
     scene_free(scene);
 }
 
+static const char rounds[] =
+    "{\"version\": 1, \"Tank\": {\"type\": \"cone\", \"radius\": 5, \"topRadius\": 6, \"height\": 3, "
+    "\"translation\": [0, "
+    "1.5, 0]}, \"RigidBodies\": [{\"name\": \"a\", \"cylinder\": {\"radius\": 0.5, \"height\": 2}},"
+    "{\"name\": \"b\", \"star\": {\"radius\": 0.5, \"innerRadius\": 0.25, \"height\": 1, \"branches\": 7}, "
+    "\"mass\": 3},"
+    "{\"name\": \"c\", \"cone\": {\"radius\": 0.5, \"topRadius\": 0, \"height\": 1}}]}";
+
+static void round_shapes_reach_the_def(void **state) {
+    (void)state;
+    Err err = {0};
+    Scene *scene = parse(rounds, &err);
+    assert_non_null(scene);
+    const SkiffGeometryDef *tank = &scene->def.tank.geometry;
+    assert_int_equal(tank->kind, SKIFF_GEOMETRY_CONE);
+    assert_true(tank->radius == 5 && tank->top_radius == 6 && tank->height == 3);
+    assert_vec3(tank->translation, 0, 1.5f, 0);
+    const SkiffBodyDef *bodies = scene->def.bodies;
+    assert_int_equal(bodies[0].geometry.kind, SKIFF_GEOMETRY_CYLINDER);
+    assert_true(bodies[0].geometry.radius == 0.5f && bodies[0].geometry.height == 2);
+    assert_int_equal(bodies[1].geometry.kind, SKIFF_GEOMETRY_STAR);
+    assert_int_equal(bodies[1].geometry.branches, 7);
+    assert_true(bodies[1].geometry.inner_radius == 0.25f);
+    assert_int_equal(bodies[2].geometry.kind, SKIFF_GEOMETRY_CONE);
+    assert_true(bodies[2].geometry.top_radius == 0);
+    scene_free(scene);
+    scene = parse("{\"version\": 1, \"Tank\": {\"type\": \"star\", \"radius\": 3.5, \"innerRadius\": 2, "
+                  "\"height\": 5}}",
+                  &err);
+    assert_non_null(scene);
+    assert_int_equal(scene->def.tank.geometry.kind, SKIFF_GEOMETRY_STAR);
+    assert_int_equal(scene->def.tank.geometry.branches, 5);
+    scene_free(scene);
+}
+
 /* ---- The effective scene ---- */
 
 static char *effective_text(const Scene *scene) {
@@ -344,6 +403,7 @@ static void the_effective_scene_is_a_scene(void **state) {
     (void)state;
     Err err = {0};
     expect_stable(parse("{\"version\": 1}", &err));
+    expect_stable(parse(rounds, &err));
     expect_stable(scene_parse("/nowhere/full.json", full, strlen(full), NULL, 0, &err));
     expect_stable(parse(
         "{\"version\": 1, \"Configuration\": {\"viscosity\": 0.123456789, \"duration\": 0.1234567890123},"
@@ -527,6 +587,7 @@ int main(void) {
         cmocka_unit_test(too_many_problems_are_counted),
         cmocka_unit_test(keys_reach_the_def),
         cmocka_unit_test(bodies_and_probes_reach_the_def),
+        cmocka_unit_test(round_shapes_reach_the_def),
         cmocka_unit_test(the_effective_scene_is_a_scene),
         cmocka_unit_test(shipped_scenes_are_good),
         cmocka_unit_test(edits_change_the_scene),

@@ -1,0 +1,10 @@
+/* The file assets/rest/tile.skiff, turned into an array when the engine is built (CMakeLists.txt). */
+#ifndef SKIFF_TILE_BYTES_H
+#define SKIFF_TILE_BYTES_H
+
+#include <stddef.h>
+
+extern const unsigned char tile_bytes[];
+extern const size_t tile_bytes_size;
+
+#endif
