@@ -1,5 +1,5 @@
-/* Smooths the water's depth: the narrow-range filter of [Truong & Yuksel 2018] along rows, then along
- * columns, then a local mean. The result is in IMAGE_DEPTH_WORK. */
+/* Smooths the water's depth: a filter after [Truong & Yuksel 2018] along rows, then along columns, then a
+ * local mean. The result is in IMAGE_DEPTH_WORK. */
 #include "pass.h"
 
 #include "shader.h"

@@ -66,9 +66,9 @@ vec4 see_through(Water water, float ray_length, vec2 bend, float thickness, vec3
     return vec4(mesh_behind ? textureLod(mesh_image, at, 0.0).rgb : empty, under);
 }
 
-// White water: cells of foam that close up as there is more of it.
-float foam_cover(vec2 p, vec2 slopes, float amount, float level) {
-    float coarse = ripple_layer(2, p + slopes * 0.08, level).z, fine = ripple_layer(3, p, level).w;
+// White water: cells of foam that close up as there is more of it. The texels are those of the ripples, read once.
+float foam_cover(vec2 p, float amount, float level) {
+    float coarse = ripple_layer(2, p, level).z, fine = ripple_layer(3, p, level).w;
     float pattern = 0.58 * coarse + 0.42 * fine;
     float dense = 1.0 - exp(-1.1 * amount);
     return clamp(smoothstep(0.85 - dense, 2.0 - 1.2 * dense, pattern + 0.25 * dense) * min(1.0, 4.0 * dense), 0.0, 0.95);
@@ -134,7 +134,7 @@ vec3 shade(Water water, vec3 direction, float ray_length, vec3 background, vec3 
     float airborne = ocean ? smoothstep(0.16, 0.26, water.place.y - eye.w) : 0.7;
     float thin = airborne * water.fluid * (1.0 - smoothstep(0.12, 0.40, sums.r));
     c = mix(c, vec3(0.80, 0.88, 0.92) * light, 0.5 * thin);
-    c = mix(c, vec3(0.93, 0.97, 1.0) * light, foam_cover(water.place.xz, slopes, foam, level));
+    c = mix(c, vec3(0.93, 0.97, 1.0) * light, foam_cover(water.place.xz, foam, level));
     return ocean ? mix(c, air, 1.0 - exp(-0.0035 * max(far - 6.0, 0.0))) : c;
 }
 

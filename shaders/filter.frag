@@ -1,6 +1,7 @@
 // One direction of the narrow-range filter [Truong & Yuksel 2018, A narrow-range filter for screen-space fluid rendering]
 // on the residual depth. What is far in front of the range is left out; what is far behind counts as a little behind.
-// The range grows where neighbours are connected, so that slopes stay.
+// Unlike theirs the range does not grow along connected neighbours (the residual has no slope to follow, and whether two
+// are connected flips from pixel to pixel at the end of a crest), and its ends are soft.
 #include "frame.glsl"
 uniform sampler2D depth_image;
 uniform ivec2 direction;
@@ -27,17 +28,14 @@ void main() {
     float stride = clamp(wanted / float(TAPS), 1.0, 5.0);
     float falloff = 4.5 / float(taps * taps);
     vec2 sum = vec2(centre, 0.0), weights = vec2(1.0, 0.0);
-    vec2 upper = vec2(centre + range), lower = vec2(centre - range);
+    float softness = 1.0 / (0.5 * range);
     for (int i = 1; i <= taps; i++) {
         ivec2 step_to = direction * int(float(i) * stride + 0.5);
         vec2 z = vec2(texelFetch(depth_image, clamp(pixel + step_to, ivec2(0), last), 0).r,
                       texelFetch(depth_image, clamp(pixel - step_to, ivec2(0), last), 0).r);
-        vec2 weight = exp(-float(i * i) * falloff) * step(lower, z);
-        vec2 inside = weight * step(z, upper);
-        bvec2 connected = greaterThan(inside, vec2(0.0));
-        vec2 counted = mix(vec2(behind), z, step(z, upper));
-        upper = mix(upper, max(upper, z + range), connected);
-        lower = mix(lower, min(lower, z - range), connected);
+        vec2 off = z - centre;
+        vec2 weight = exp(-float(i * i) * falloff) * clamp((off + range) * softness + 1.0, 0.0, 1.0);
+        vec2 counted = mix(z, vec2(behind), clamp((off - range) * softness, 0.0, 1.0));
         sum += counted * weight;
         weights += weight;
     }

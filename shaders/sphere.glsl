@@ -16,5 +16,5 @@ vec4 sphere_color(vec3 n) {
     vec3 to_sun = mat3(view) * sun.xyz;
     float lit = 0.5 + 0.5 * dot(n, to_sun);
     float shine = pow(max(reflect(-to_sun, n).z, 0.0), 24.0);
-    return vec4(paint.rgb * (0.45 + 0.75 * lit * lit) * (0.70 + 0.30 * n.z) + 0.12 * shine, paint.a);
+    return vec4(paint.rgb * (0.55 + 0.75 * lit * lit) * (0.70 + 0.30 * n.z) + 0.03 + 0.12 * shine, paint.a);
 }
