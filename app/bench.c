@@ -5,6 +5,7 @@
 
 #include "json_text.h"
 #include "machine.h"
+#include "pilot.h"
 #include "progress.h"
 #include "scene.h"
 #include "summary.h"
@@ -29,6 +30,7 @@ typedef struct Bench {
     const CliArgs *args;
     const Scene *scene;
     SkiffSim *sim;
+    Pilot pilot;
     Window *windows;
     /* sums over all steps measured */
     double density_iterations, divergence_iterations, density_error, divergence_error, neighbours, solve_ms;
@@ -59,13 +61,13 @@ static bool measure(Bench *bench, Err *err) {
     Progress progress = progress_begin(start, settled + dt * args->steps * args->windows, args->quiet);
     bool ok = true;
     while (ok && skiff_time(bench->sim) + 0.5 * dt < settled) {
-        ok = skiff_step(bench->sim, err);
+        ok = pilot_step(&bench->pilot, bench->sim, err) && skiff_step(bench->sim, err);
         if (ok)
             progress_step(&progress, bench->sim);
     }
     for (int w = 0; ok && w < args->windows; w++)
         for (int s = 0; ok && s < args->steps; s++) {
-            ok = skiff_step(bench->sim, err);
+            ok = pilot_step(&bench->pilot, bench->sim, err) && skiff_step(bench->sim, err);
             if (ok) {
                 add_step(bench, &bench->windows[w]);
                 progress_step(&progress, bench->sim);
@@ -341,12 +343,14 @@ bool bench_command(const CliArgs *args, Err *err) {
     if (!scene)
         return false;
     Bench bench = {.args = args, .scene = scene};
-    bench.sim = scene_start(scene, args->threads, (SkiffSimd)args->simd, err);
+    const bool read = pilot_read(&bench.pilot, scene, args->input, NULL, err);
+    bench.sim = read ? scene_start(scene, args->threads, (SkiffSimd)args->simd, err) : NULL;
     bench.windows = calloc((size_t)args->windows, sizeof *bench.windows);
     bool ok =
         bench.sim && (bench.windows || err_set(err, ERR_IO, "out of memory")) && bench_scene(&bench, err);
     free(bench.windows);
     skiff_destroy(bench.sim);
+    pilot_free(&bench.pilot);
     scene_free(scene);
     return ok;
 }

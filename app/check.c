@@ -3,6 +3,7 @@
 #include "commands.h"
 
 #include "json_text.h"
+#include "pilot.h"
 #include "scene.h"
 #include "summary.h"
 
@@ -61,11 +62,15 @@ bool check_command(const CliArgs *args, Err *err) {
     Scene *scene = scene_load(args->scene, args->edits, args->edit_count, err);
     if (!scene)
         return false;
-    SkiffSim *sim = scene_start(scene, args->threads, (SkiffSimd)args->simd, err);
+    Pilot pilot;
+    SkiffSim *sim = pilot_read(&pilot, scene, NULL, NULL, err)
+                        ? scene_start(scene, args->threads, (SkiffSimd)args->simd, err)
+                        : NULL;
     bool ok = sim && print_json(scene_effective(scene), err);
     if (ok)
         print_summary(scene, sim);
     skiff_destroy(sim);
+    pilot_free(&pilot);
     scene_free(scene);
     return ok;
 }

@@ -71,6 +71,12 @@ typedef struct Command {
             .help = "Change a key of the scene, e.g. Configuration.viscosity=0.05, viscosity=0.05 for "      \
                     "short, RigidBodies[0].density=300. Repeatable"                                          \
     }
+#define OPTION_ROW_INPUT                                                                                     \
+    {                                                                                                        \
+        'i', "input", "FILE", OPTION_TEXT, AT(input),                                                        \
+            .help = "Input file that drives and steers, in place of the scene's. Lines: TIME "               \
+                    "throttle|rudder|heading VALUE, TIME press|release KEY, TIME camera NAME"                \
+    }
 #define OPTION_ROW_HELP                                                                                      \
     { 'h', "help", NULL, OPTION_FLAG, AT(help), .help = "Show this help" }
 
@@ -137,6 +143,7 @@ typedef struct Command {
 
 static const Option run_options[] = {
     {'o', "output", "DIR", OPTION_TEXT, AT(output), .help = "Folder for the results, created; required"},
+    OPTION_ROW_INPUT,
     {'d', "duration", "S", OPTION_NUMBER, AT(duration), .min = 1e-6, .max = 1e6,
      .help = "Simulated seconds, in place of the scene's"},
     OPTION_ROWS_ENGINE,
@@ -173,6 +180,7 @@ static const Option bench_options[] = {
      .help = "Steps of a window (default 20)"},
     {0, "windows", "N", OPTION_INTEGER, AT(windows), .min = 1, .max = 1e4, .help = "Windows (default 5)"},
     {0, "json", NULL, OPTION_FLAG, AT(json), .help = "One line of JSON in place of the table"},
+    OPTION_ROW_INPUT,
     OPTION_ROWS_ENGINE,
     OPTION_ROW_SET,
     {0, "results", "DIR", OPTION_TEXT, AT(results),
@@ -185,6 +193,11 @@ static const Option bench_options[] = {
 
 #define OPTION_ROW_JSON                                                                                      \
     { 0, "json", NULL, OPTION_FLAG, AT(json), .help = "One line of JSON in place of the table" }
+
+static const Option profile_options[] = {
+    OPTION_ROW_JSON,
+    OPTION_ROW_HELP,
+};
 
 static const Option rest_make_options[] = {
     {'o', "output", "FILE", OPTION_TEXT, AT(output), .help = "Write the tile (default: measure it only)"},
@@ -231,10 +244,10 @@ static const Option gl_info_options[] = {
 
 static const Command commands[] = {
     {"run", "scene", true, "SCENE -o DIR", "Simulate a scene and write its results into a folder",
-     "The folder receives report.html (charts; open it in a browser), summary.json, steps.csv, hull.csv "
-     "(bodies),\n"
-     "probes.csv, scene.json (the scene with every default filled in) and state.skiff (checkpoint); with\n"
-     "pictures also frames/ and video.mp4.\n"
+     "The folder receives report.html (charts; open it in a browser), summary.json, steps.csv, ledger.csv\n"
+     "(particles in and out by cause), hull.csv (bodies), probes.csv, trace.json (opens in Perfetto),\n"
+     "scene.json (the scene with every default filled in), run.input (what was driven; --input replays it)\n"
+     "and state.skiff (checkpoint); with pictures also frames/ and video.mp4.\n"
      "Ctrl-C finishes the step, writes a checkpoint and the report, and exits with 130; --resume goes on "
      "from there.\n",
      "  skiff run assets/scenes/settling-tank.json -o out/tank\n"
@@ -257,6 +270,14 @@ static const Command commands[] = {
      "  skiff bench assets/scenes/bench-tank.json\n"
      "  skiff bench assets/scenes/bench-dam.json --settle 0 --steps 95 --windows 7 --json\n",
      bench_options, COUNT(bench_options), bench_command},
+    {"profile", "folder", true, "DIR", "Show where the time of a run's steps went",
+     "Reads steps.csv in a folder of results: percentiles of the step times, means of each phase for all\n"
+     "steps, for plain ones (no window move, nor one within the last five steps) and for window moves, the\n"
+     "mean of the five steps after a move, and for the ten slowest steps what they did that others did "
+     "not.\n",
+     "  skiff profile out/tank\n"
+     "  skiff profile out/tank --json\n",
+     profile_options, COUNT(profile_options), profile_command},
     {"rest make", NULL, false, "[-o FILE]", "Make a tile of water at rest, which shapes are filled from",
      "Relaxes random points of a periodic cube until every density is rest density and the pressures of "
      "still\n"

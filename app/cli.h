@@ -17,6 +17,7 @@ typedef struct CliPictures {
 /* What the command line said. Options that a command does not have keep their defaults. */
 typedef struct CliArgs {
     const char *scene;  /* what a command is about, mostly a scene; NULL: left out where it may be */
+    const char *input;  /* --input; NULL: not given */
     const char *output; /* -o; NULL: not given */
     double duration;    /* s; NaN: the scene's */
     int threads;        /* 0: one for each core */

@@ -95,7 +95,7 @@ static bool begin(Redraw *redraw, Err *err) {
     if (exports(args))
         return frames_remove_sequence(redraw->output, ".", export_suffix((ExportFormat)args->pictures.export),
                                       err);
-    return frames_remove(redraw->output, err) && view_begin(redraw->view, NULL, redraw->output, err);
+    return frames_remove(redraw->output, err) && view_begin(redraw->view, NULL, NULL, redraw->output, err);
 }
 
 static bool handle_frame(Redraw *redraw, int number, Err *err) {

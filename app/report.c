@@ -2,6 +2,7 @@
  * in it comes from summary.json and the CSV files. */
 #include "report.h"
 
+#include "html.h"
 #include "svg.h"
 
 #include "engine/base/file.h"
@@ -9,47 +10,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-static const char style[] =
-    ":root{--ink:#1d2733;--soft:#5b6875;--line:#dfe5ea;--page:#f4f7f9;--card:#fff;--blue:#2f6db3}"
-    "*{box-sizing:border-box}"
-    "body{margin:0;background:var(--page);color:var(--ink);font:16px/1.5 system-ui,-apple-system,'Segoe "
-    "UI',Roboto,"
-    "'Helvetica Neue',Arial,sans-serif}"
-    "main{max-width:1240px;margin:0 auto;padding:24px 16px 48px}"
-    "h1{font-size:1.7rem;line-height:1.2;margin:0 0 4px}h2{font-size:1.15rem;margin:34px 0 12px}"
-    "p{margin:0 0 6px}.soft{color:var(--soft)}"
-    ".status{display:inline-block;padding:1px "
-    "10px;border-radius:12px;font-size:.85rem;font-weight:600;vertical-align:3px;"
-    "background:#dff1e5;color:#1e6b3a}.status.interrupted{background:#fdf0d5;color:#8a5a00}"
-    ".status.diverged{background:#fbdedb;color:#9b231b}"
-    ".figures{display:grid;grid-template-columns:repeat(auto-fill,minmax(150px,1fr));gap:10px;margin:18px 0 "
-    "0}"
-    ".figures div{background:var(--card);border:1px solid var(--line);border-radius:8px;padding:10px 12px}"
-    ".figures "
-    "b{display:block;font-size:1.3rem;line-height:1.25;font-variant-numeric:tabular-nums;overflow-wrap:"
-    "anywhere}"
-    ".figures span{font-size:.8rem;color:var(--soft)}"
-    ".charts{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,480px),1fr));gap:14px}"
-    "figure{margin:0;background:var(--card);border:1px solid var(--line);border-radius:8px;padding:12px 12px "
-    "8px}"
-    "figcaption{font-weight:600;margin:0 0 6px}svg{display:block;width:100%;height:auto}"
-    "svg text{font-family:inherit;fill:var(--soft)}.ticks "
-    "text{font-size:13.5px;font-variant-numeric:tabular-nums}"
-    "text.label{font-size:13.5px;fill:var(--ink)}.grid line{stroke:#e6ebef}line.axis{stroke:#9aa6b1}"
-    ".legend{list-style:none;margin:4px 0 0;padding:0;display:flex;flex-wrap:wrap;gap:2px "
-    "16px;font-size:.85rem}"
-    ".legend "
-    "i{display:inline-block;width:12px;height:12px;border-radius:3px;margin-right:6px;vertical-align:-1px}"
-    ".none{color:var(--soft);padding:30px 0;text-align:center}"
-    ".wide{overflow-x:auto;background:var(--card);border:1px solid var(--line);border-radius:8px}"
-    "table{border-collapse:collapse;width:100%;font-size:.9rem;font-variant-numeric:tabular-nums}"
-    "th,td{padding:6px 12px;text-align:right;border-bottom:1px solid var(--line);white-space:nowrap}"
-    "th:first-child,td:first-child{text-align:left}tr:last-child "
-    "td{border-bottom:0}th{color:var(--soft);font-weight:600}"
-    "tr.sum td{font-weight:600}code{font-size:.9em;overflow-wrap:anywhere}"
-    "@media(max-width:560px){.ticks text,text.label{font-size:17px}main{padding:16px 10px 32px}}"
-    "@media print{body{background:#fff}figure,.figures div{break-inside:avoid}}";
 
 /* ---- Pieces ---- */
 
@@ -104,12 +64,8 @@ static void write_header(FILE *out, const ReportInput *input) {
     char name[256];
     scene_name(input->scene, name, sizeof name);
     const char *title = *input->scene->title ? input->scene->title : name;
-    fputs("<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
-          "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>",
-          out);
-    svg_text(out, title);
-    fprintf(out, "</title><link rel=\"icon\" href=\"data:,\"><style>%s</style></head><body><main>\n<h1>",
-            style);
+    html_begin(out, title);
+    fputs("<h1>", out);
     svg_text(out, title);
     fprintf(out, " <span class=\"status %s\">%s</span></h1>\n<p class=\"soft\">", status, status);
     svg_text(out, text_at(machine, "cpu"));
@@ -119,6 +75,18 @@ static void write_header(FILE *out, const ReportInput *input) {
         fputs("<p>", out);
         svg_text(out, message);
         fputs("</p>\n", out);
+    }
+}
+
+/* Particles that appeared or disappeared, for each cause that there was. */
+static void write_causes(FILE *out, const json_t *counts, int count, const char *(*key)(int cause),
+                         const char *(*label)(int cause)) {
+    for (int i = 0; i < count; i++) {
+        char text[128];
+        const double particles = json_number_value(json_object_get(counts, key(i)));
+        snprintf(text, sizeof text, "particles %s", label(i));
+        if (particles > 0)
+            figure_count(out, particles, text);
     }
 }
 
@@ -139,8 +107,11 @@ static void write_figures(FILE *out, const json_t *summary) {
     figure_number(out, number_at(summary, "errors_percent", "density_max", "max"),
                   "% density error, largest");
     figure_number(out, number_at(summary, "peak_rss_mb", NULL, NULL), "MB of memory, peak");
-    if (number_at(summary, "removed", NULL, NULL) > 0)
-        figure_count(out, number_at(summary, "removed", NULL, NULL), "particles that left the domain");
+    if (number_at(summary, "moves", NULL, NULL) > 0)
+        figure_count(out, number_at(summary, "moves", NULL, NULL), "window moves");
+    write_causes(out, json_object_get(summary, "particles_in"), SKIFF_IN_COUNT, skiff_in_key, skiff_in_label);
+    write_causes(out, json_object_get(summary, "particles_out"), SKIFF_OUT_COUNT, skiff_out_key,
+                 skiff_out_label);
     fputs("</div>\n", out);
 }
 
@@ -265,6 +236,27 @@ static void write_probe_charts(FILE *out, const ReportInput *input, const double
     }
 }
 
+/* Nothing for a body without a drive. */
+static void write_drive_charts(FILE *out, const CsvTable *hull, const double *t, const char *name) {
+    static const struct {
+        const char *what, *unit, *columns[2];
+    } charts[] = {
+        {"speed along the heading", "m/s", {"speed"}},
+        {"heading, to starboard of the start", "rad", {"heading"}},
+        {"helm", "share of full throttle and rudder", {"throttle", "rudder"}},
+    };
+    for (size_t i = 0; i < sizeof charts / sizeof *charts; i++) {
+        char title[128], column[96];
+        snprintf(title, sizeof title, "%s: %s", name, charts[i].what);
+        ChartData data = chart_begin(title, charts[i].unit, hull, t);
+        for (int c = 0; c < 2 && charts[i].columns[c]; c++) {
+            snprintf(column, sizeof column, "%s.%s", name, charts[i].columns[c]);
+            chart_add(&data, hull, column, charts[i].columns[c]);
+        }
+        chart_end(out, &data);
+    }
+}
+
 static void write_body_charts(FILE *out, const ReportInput *input, const double *t) {
     char column[96];
     int count = skiff_body_count(input->sim);
@@ -283,6 +275,7 @@ static void write_body_charts(FILE *out, const ReportInput *input, const double 
         write_vector_chart(out, &input->hull, t, input->scene->def.bodies[i].name, "velocity", "m/s", "v");
         write_vector_chart(out, &input->hull, t, input->scene->def.bodies[i].name, "force of the fluid", "N",
                            "f");
+        write_drive_charts(out, &input->hull, t, input->scene->def.bodies[i].name);
     }
 }
 
@@ -371,10 +364,12 @@ static void write_footer(FILE *out, const ReportInput *input) {
             "<code>%s</code> (equal states have equal hashes, whatever the number of threads).</p>\n",
             1000 * number_at(input->summary, "time_step", NULL, NULL), text_at(machine, "version"),
             text_at(machine, "commit"), text_at(machine, "compiler"), text_at(input->summary, "state_hash"));
-    fputs("<p class=\"soft\">Numbers: steps.csv, hull.csv, probes.csv and summary.json beside this file. "
-          "Bands around the curves "
-          "show the range within the interval of a point.</p>\n</main></body></html>\n",
-          out);
+    fputs(
+        "<p class=\"soft\">Numbers: steps.csv, ledger.csv, hull.csv, probes.csv and summary.json beside this "
+        "file; trace.json opens in Perfetto. Bands around the curves show the range within the interval of a "
+        "point.</p>\n",
+        out);
+    html_end(out);
 }
 
 bool report_write(const char *path, const ReportInput *input, Err *err) {

@@ -10,7 +10,7 @@ typedef struct ReportInput {
     const Scene *scene;
     const SkiffSim *sim;
     const json_t *summary;
-    CsvTable steps, hull, probes;
+    CsvTable steps, ledger, hull, probes;
 } ReportInput;
 
 bool report_write(const char *path, const ReportInput *input, Err *err);

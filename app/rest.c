@@ -111,8 +111,10 @@ static bool find_box(const CliArgs *args, const SkiffSim *sim, double min[3], do
         min[k] = isnan(args->min[k]) ? (double)low + particles.origin[k] + margin : args->min[k];
         max[k] = isnan(args->max[k]) ? (double)high + particles.origin[k] - margin : args->max[k];
         if (!(min[k] < max[k]))
-            return err_set(err, ERR_INPUT, "%s: nothing to cut: the box reaches from %g to %g m in %c",
-                           args->scene, min[k], max[k], "xyz"[k]);
+            return err_set(
+                err, ERR_INPUT,
+                "%s: nothing to cut: the box that --min and --max give reaches from %g to %g m in %c",
+                args->scene, min[k], max[k], "xyz"[k]);
     }
     return true;
 }

@@ -105,6 +105,7 @@ static SkiffBodyDef body_def(const SceneBody *body) {
     memcpy(def.angular_velocity, body->angular_velocity, sizeof def.angular_velocity);
     def.free_axes = body->free_axes;
     def.release_time = body->release_time;
+    def.drive = body->drive;
     return def;
 }
 
@@ -151,6 +152,9 @@ static void fill_def(Scene *scene) {
     def->probes = probes;
     def->probe_count = file->probes.count;
     scene->title = file->title;
+    scene->input = file->input;
+    scene->keys = file->keys.items;
+    scene->key_count = file->keys.count;
     scene->duration = configuration->duration;
     scene->probe_rate = configuration->probe_rate;
     scene->render = file->render;

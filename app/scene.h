@@ -2,15 +2,20 @@
 #ifndef SKIFF_APP_SCENE_H
 #define SKIFF_APP_SCENE_H
 
+#include "script.h"
+
 #include "engine/skiff.h"
 
 #include <jansson.h>
 
 typedef struct Scene {
-    const char *file;                 /* as the user named it */
-    const char *title;                /* "" where there is none */
-    double duration;                  /* s, from def.start_time */
-    double probe_rate;                /* Hz; 0: every step */
+    const char *file;  /* as the user named it */
+    const char *title; /* "" where there is none */
+    double duration;   /* s, from def.start_time */
+    double probe_rate; /* Hz; 0: every step */
+    const char *input; /* input file, as a path that can be opened; NULL: none */
+    const ScriptKey *keys;
+    int key_count;
     SkiffDef def;                     /* strings and arrays belong to the scene */
     const struct SceneRender *render; /* NULL: the file has no section "Render" */
     struct SceneContent *content;

@@ -1,26 +1,9 @@
 /* Every key of a scene file, once. Keys, meanings and units follow SPlisHSPlasH scenes where there is such a
  * thing; keys of Configuration that set the simulation come from the engine's own list (engine/params.inl).
  */
-#include "scene_table.h"
+#include "scene_rows.h"
 
-#include <math.h>
 #include <string.h>
-
-#define COUNT(table) ((int)(sizeof(table) / sizeof *(table)))
-#define COORDINATE   .min = -1e5, .max = 1e5, .unit = "m"
-#define LENGTH       .min = 1e-4, .max = 1e5, .unit = "m"
-#define SPEED        .min = -1e4, .max = 1e4, .unit = "m/s"
-#define DURATION     .min = 0, .max = 1e6, .unit = "s"
-
-static void set3(float out[3], float x, float y, float z) {
-    out[0] = x;
-    out[1] = y;
-    out[2] = z;
-}
-
-static bool is_given(const float vector[3]) {
-    return !isnan(vector[0]);
-}
 
 static void check_corners(const float min[3], const float max[3], const char *min_key, const char *max_key,
                           Problems *problems) {
@@ -53,30 +36,30 @@ static void check_domain(void *object, Problems *problems) {
                       problems);
 }
 
-static bool param_row(int index, Field *field) {
+/* Row of a field that stands in one of the engine's own lists, in a struct `base` bytes into the object. */
+static Field info_row(const SkiffParamInfo *info, size_t base) {
     static const FieldType types[] = {[SKIFF_FLOAT] = FIELD_FLOAT,
                                       [SKIFF_INT] = FIELD_INT,
                                       [SKIFF_BOOL] = FIELD_BOOL,
                                       [SKIFF_VEC3] = FIELD_VEC3,
                                       [SKIFF_ENUM] = FIELD_ENUM};
-    int count;
-    const SkiffParamInfo *infos = skiff_param_infos(&count);
-    if (index >= count)
-        return false;
-    const SkiffParamInfo *info = &infos[index];
-    *field = (Field){.key = info->key,
-                     .type = types[info->type],
-                     .offset = offsetof(SceneConfiguration, params) + info->offset,
-                     .min = info->min,
-                     .max = info->max,
-                     .unit = info->unit,
-                     .names = info->names,
-                     .help = info->help};
-    return true;
+    return (Field){.key = info->key,
+                   .type = types[info->type],
+                   .offset = base + info->offset,
+                   .min = info->min,
+                   .max = info->max,
+                   .unit = info->unit,
+                   .names = info->names,
+                   .help = info->help};
 }
 
-#define ROW(field_type, struct_type, member, json_key)                                                       \
-    .key = json_key, .type = field_type, .offset = offsetof(struct_type, member)
+static bool param_row(int index, Field *field) {
+    int count;
+    const SkiffParamInfo *infos = skiff_param_infos(&count);
+    if (index < count)
+        *field = info_row(&infos[index], offsetof(SceneConfiguration, params));
+    return index < count;
+}
 
 static const Field configuration_fields[] = {
     {ROW(FIELD_DOUBLE, SceneConfiguration, duration, "duration"), .min = 1e-6, .max = 1e6, .unit = "s",
@@ -372,6 +355,11 @@ static const Field block_fields[] = {
      .help = "Corner with the smallest coordinates; the first particle is half a spacing inside"},
     {ROW(FIELD_VEC3, SkiffBlockDef, end, "end"), COORDINATE, .flags = FIELD_REQUIRED,
      .help = "Corner with the largest coordinates; (end - start) / spacing particles along each axis"},
+    {ROW(FIELD_ENUM, SkiffBlockDef, fill, "fill"), .names = "lattice|rest",
+     .help = "lattice: points of a cubic lattice, all inside; rest: water at rest wherever walls, bodies and "
+             "existing water leave room"},
+    {ROW(FIELD_VEC3, SkiffBlockDef, offset, "offset"), COORDINATE,
+     .help = "Shifts the pattern of the points of fill rest"},
     {ROW(FIELD_VEC3, SkiffBlockDef, velocity, "velocity"), SPEED, .help = "Velocity when emitted"},
     {ROW(FIELD_DOUBLE, SkiffBlockDef, time, "time"), DURATION, .help = "When it is emitted; 0: at the start"},
     {ROW(FIELD_DOUBLE, SkiffBlockDef, period, "period"), DURATION, .help = "Time between repetitions"},
@@ -391,6 +379,25 @@ static const ObjectType block_type = {.help = "A box of fluid, emitted once or p
                                       .rule_count = COUNT(block_rules)};
 
 /* ---- RigidBodies ---- */
+
+static void init_drive(void *object) {
+    *(SkiffDriveDef *)object = skiff_drive_default();
+}
+
+static bool drive_row(int index, Field *field) {
+    int count;
+    const SkiffParamInfo *infos = skiff_drive_infos(&count);
+    if (index < count)
+        *field = info_row(&infos[index], 0);
+    return index < count;
+}
+
+static const ObjectType drive_type = {
+    .help = "What drives and steers a body. Points and directions are in the geometry's own frame, as its "
+            "vertices are",
+    .more = drive_row,
+    .size = sizeof(SkiffDriveDef),
+    .init = init_drive};
 
 enum { GROUP_SHAPE = 1, GROUP_WEIGHT = 2 };
 
@@ -462,6 +469,8 @@ static const Field body_fields[] = {
      .help = "Axes along and about which a dynamic body can move; absent: all"},
     {ROW(FIELD_DOUBLE, SceneBody, release_time, "releaseTime"), DURATION,
      .help = "A dynamic body is held until then"},
+    {ROW(FIELD_OBJECT, SceneBody, drive, "drive"), .flags = FIELD_NULLABLE, .object = &drive_type,
+     .help = "Propulsion and steering; absent: none"},
 };
 
 static const FieldRule body_rules[] = {{"rotationAxis|rotationAngle", check_body_rotation},
@@ -537,194 +546,51 @@ static const ObjectType probe_type = {.help = "A measurement, written to probes.
                                       .rule_count = COUNT(probe_rules),
                                       .variant_key = "type"};
 
-/* ---- Render ---- */
+/* ---- Keys ---- */
 
-SceneRender scene_render_default(void) {
-    return (SceneRender){.fps = 30,
-                         .width = 1280,
-                         .height = 720,
-                         .supersample = 1,
-                         .field_min = NAN,
-                         .field_max = NAN,
-                         .hud = RENDER_HUD_ON,
-                         .fade = true,
-                         .fade_in = 0.3f,
-                         .fade_out = 0.3f,
-                         .fade_edge = 0.5f,
-                         .ripples = 1,
-                         .sun = {-0.5f, 0.6f, 0.45f}};
+enum { LEVERS = 1 << SCRIPT_KEY_THROTTLE | 1 << SCRIPT_KEY_RUDDER, CAMERA = 1 << SCRIPT_KEY_CAMERA };
+
+static void init_key(void *object) {
+    *(ScriptKey *)object = (ScriptKey){.value = 1};
 }
 
-static void init_render(void *object) {
-    *(SceneRender *)object = scene_render_default();
-}
-
-void scene_camera_default(SceneCamera *camera) {
-    *camera = (SceneCamera){.distance = NAN,
-                            .height = NAN,
-                            .look_up = NAN,
-                            .azimuth = NAN,
-                            .period = NAN,
-                            .smoothing = NAN,
-                            .fov = NAN};
-    set3(camera->eye, NAN, NAN, NAN);
-    set3(camera->target, NAN, NAN, NAN);
-    set3(camera->forward, NAN, NAN, NAN);
-}
-
-static void init_camera(void *object) {
-    scene_camera_default(object);
-}
-
-static void init_material(void *object) {
-    SceneMaterial *material = object;
-    *material = (SceneMaterial){.waterline = NAN, .cabin_base = NAN, .cabin_top = NAN};
-    set3(material->color, NAN, NAN, NAN);
-}
-
-static void check_sun(void *object, Problems *problems) {
-    const SceneRender *render = object;
-    if (render->sun[1] > 0)
-        return;
-    size_t mark = problems_enter(problems, "sun");
-    problems_enter_index(problems, 1);
-    problems_add(problems, "%g is not above 0: the sun is up", (double)render->sun[1]);
-    problems_leave(problems, mark);
-}
-
-static void check_field_range(void *object, Problems *problems) {
-    const SceneRender *render = object;
-    if (!(render->field_min >= render->field_max))
-        return;
-    size_t mark = problems_enter(problems, "fieldMax");
-    problems_add(problems, "%g is not above fieldMin, which is %g", (double)render->field_max,
-                 (double)render->field_min);
-    problems_leave(problems, mark);
-}
-
-static void check_forward(void *object, Problems *problems) {
-    const SceneCamera *camera = object;
-    if (!is_given(camera->forward) || camera->forward[0] != 0 || camera->forward[2] != 0)
-        return;
-    size_t mark = problems_enter(problems, "forward");
-    problems_add(problems, "has no horizontal direction");
-    problems_leave(problems, mark);
-}
-
-#define OPTIONAL_LENGTH .min = 1e-3, .max = 1e5, .unit = "m", .flags = FIELD_NULLABLE
-
-static const Field camera_fields[] = {
-    {ROW(FIELD_NAME, SceneCamera, name, "name"), .flags = FIELD_REQUIRED,
-     .help = "For --camera and for `camera NAME` in an input script"},
-    {ROW(FIELD_ENUM, SceneCamera, type, "type"), .names = RENDER_CAMERAS, .flags = FIELD_REQUIRED,
-     .help = "Behind a body; still; circling it; above it; on board"},
-    {ROW(FIELD_NAME, SceneCamera, body, "body"), .flags = FIELD_NULLABLE,
-     .help = "That is followed; absent: the first dynamic one, or the middle of the scene (fixed: none)"},
-    {ROW(FIELD_VEC3, SceneCamera, eye, "eye"), COORDINATE, .flags = FIELD_NULLABLE,
-     .help = "fixed: in the world; bow: from the body's centre, along its axes"},
-    {ROW(FIELD_VEC3, SceneCamera, target, "target"), COORDINATE, .flags = FIELD_NULLABLE,
-     .help = "Point in the world that is looked at where no body is followed"},
-    {ROW(FIELD_VEC3, SceneCamera, forward, "forward"), .min = -1e6, .max = 1e6, .flags = FIELD_NULLABLE,
-     .help =
-         "Direction of the body's bow in the world at the start; absent: where -x of its geometry points"},
-    {ROW(FIELD_FLOAT, SceneCamera, distance, "distance"), OPTIONAL_LENGTH,
-     .help = "chase, orbit: horizontal distance from the body; top: height above it"},
-    {ROW(FIELD_FLOAT, SceneCamera, height, "height"), COORDINATE, .flags = FIELD_NULLABLE,
-     .help = "chase, orbit: of the eye above the body's centre"},
-    {ROW(FIELD_FLOAT, SceneCamera, look_up, "lookUp"), COORDINATE, .flags = FIELD_NULLABLE,
-     .help = "chase, orbit: how far above the body's centre the camera aims"},
-    {ROW(FIELD_FLOAT, SceneCamera, azimuth, "azimuth"), .min = -100, .max = 100, .unit = "rad",
-     .flags = FIELD_NULLABLE, .help = "orbit: where it is at time 0, from +x towards +z"},
-    {ROW(FIELD_FLOAT, SceneCamera, period, "period"), .min = 0, .max = 1e6, .unit = "s",
-     .flags = FIELD_NULLABLE, .help = "orbit: time for one turn; 0: it stands still"},
-    {ROW(FIELD_FLOAT, SceneCamera, smoothing, "smoothing"), .min = 0, .max = 100, .unit = "s",
-     .flags = FIELD_NULLABLE, .help = "Time in which nine tenths of a sudden change have been followed"},
-    {ROW(FIELD_FLOAT, SceneCamera, fov, "fov"), .min = 5, .max = 150, .unit = "deg", .flags = FIELD_NULLABLE,
-     .help = "Field of view, vertical"},
+static const Field key_fields[] = {
+    {ROW(FIELD_NAME, ScriptKey, key, "key"), .flags = FIELD_REQUIRED,
+     .help = "What `press` and `release` in input files call it"},
+    {ROW(FIELD_ENUM, ScriptKey, action, "action"), .names = SCRIPT_ACTIONS, .flags = FIELD_REQUIRED,
+     .help = "What it does: throttle and rudder while it is held, camera when it is pressed"},
+    {ROW(FIELD_FLOAT, ScriptKey, value, "value"), .min = -1, .max = 1, .variants = LEVERS,
+     .help = "Throttle (ahead is above 0) or rudder (to starboard is above 0)"},
+    {ROW(FIELD_NAME, ScriptKey, camera, "camera"), .flags = FIELD_REQUIRED, .variants = CAMERA,
+     .help = "Name of the camera"},
 };
 
-static const FieldRule camera_rules[] = {{"forward", check_forward}};
-
-static const ObjectType camera_type = {
-    .help = "A camera. Lengths that are absent follow from the size of what is looked at",
-    .fields = camera_fields,
-    .field_count = COUNT(camera_fields),
-    .size = sizeof(SceneCamera),
-    .init = init_camera,
-    .rules = camera_rules,
-    .rule_count = COUNT(camera_rules)};
-
-static const Field material_fields[] = {
-    {ROW(FIELD_NAME, SceneMaterial, name, "name"), .flags = FIELD_REQUIRED, .help = "Of a body"},
-    {ROW(FIELD_ENUM, SceneMaterial, material, "material"), .names = "paint|hull|stone",
-     .help = "hull: antifouling, stripe, topsides, wooden deck and cabin"},
-    {ROW(FIELD_VEC3, SceneMaterial, color, "color"), .min = 0, .max = 1, .flags = FIELD_NULLABLE,
-     .help = "Red, green and blue, linear; absent: the material's own"},
-    {ROW(FIELD_FLOAT, SceneMaterial, waterline, "waterline"), COORDINATE, .flags = FIELD_NULLABLE,
-     .help = "hull: y of the waterline at the start; absent: that of the water"},
-    {ROW(FIELD_FLOAT, SceneMaterial, cabin_base, "cabinBase"), COORDINATE, .flags = FIELD_NULLABLE,
-     .help = "hull: y at the start where the cabin begins; absent: there is none"},
-    {ROW(FIELD_FLOAT, SceneMaterial, cabin_top, "cabinTop"), COORDINATE, .flags = FIELD_NULLABLE,
-     .help = "hull: y at the start of the cabin's roof"},
-};
-
-static const ObjectType material_type = {.help = "What a body is made of",
-                                         .fields = material_fields,
-                                         .field_count = COUNT(material_fields),
-                                         .size = sizeof(SceneMaterial),
-                                         .init = init_material};
-
-static const Field render_fields[] = {
-    {ROW(FIELD_INT, SceneRender, fps, "fps"), .min = 1, .max = 1000, .unit = "1/s",
-     .help = "Frames a second of simulated time; the step need not fit"},
-    {ROW(FIELD_INT, SceneRender, width, "width"), .min = 16, .max = 8192, .unit = "px", .help = "Of a frame"},
-    {ROW(FIELD_INT, SceneRender, height, "height"), .min = 16, .max = 8192, .unit = "px",
-     .help = "Of a frame"},
-    {ROW(FIELD_INT, SceneRender, supersample, "supersample"), .min = 1, .max = 4,
-     .help = "Drawn that many times larger, then averaged"},
-    {ROW(FIELD_ENUM, SceneRender, look, "look"), .names = RENDER_LOOKS,
-     .help = "A water surface, or spheres"},
-    {ROW(FIELD_ENUM, SceneRender, field, "field"), .names = RENDER_FIELDS,
-     .help = "Colour of the look particles; window: distance from the window's edge"},
-    {ROW(FIELD_FLOAT, SceneRender, field_min, "fieldMin"), .min = -1e9, .max = 1e9, .flags = FIELD_NULLABLE,
-     .help = "Value of the first colour; absent: one that suits the field"},
-    {ROW(FIELD_FLOAT, SceneRender, field_max, "fieldMax"), .min = -1e9, .max = 1e9, .flags = FIELD_NULLABLE,
-     .help = "Value of the last colour"},
-    {ROW(FIELD_ENUM, SceneRender, hud, "hud"), .names = RENDER_HUDS,
-     .help = "Figures in the picture; timing: with wall-clock times, which differ between runs"},
-    {ROW(FIELD_BOOL, SceneRender, fade, "fade"),
-     .help = "Created and removed particles fade, instead of popping in and out"},
-    {ROW(FIELD_FLOAT, SceneRender, fade_in, "fadeIn"), .min = 0.001, .max = 10, .unit = "s",
-     .help = "How long a created particle takes to appear"},
-    {ROW(FIELD_FLOAT, SceneRender, fade_out, "fadeOut"), .min = 0.001, .max = 0.5, .unit = "s",
-     .help = "How long a removed particle takes to vanish"},
-    {ROW(FIELD_FLOAT, SceneRender, fade_edge, "fadeEdge"), .min = 0.001, .max = 100, .unit = "m",
-     .help = "Distance from the window's edge over which the particles give way to the ocean"},
-    {ROW(FIELD_FLOAT, SceneRender, ripples, "ripples"), .min = 0, .max = 2,
-     .help = "Strength of the wind's ripples; 0 is glass"},
-    {ROW(FIELD_VEC3, SceneRender, sun, "sun"), .min = -1e3, .max = 1e3,
-     .help = "Direction towards the sun, any length; y above 0"},
-    {ROW(FIELD_NAME, SceneRender, camera, "camera"), .flags = FIELD_NULLABLE,
-     .help = "That begins: one of `cameras` or chase, fixed, orbit, top, bow, which always exist"},
-    {ROW(FIELD_LIST, SceneRender, cameras, "cameras"), .max = 100, .object = &camera_type, .help = "Cameras"},
-    {ROW(FIELD_LIST, SceneRender, bodies, "bodies"), .max = 10000, .object = &material_type,
-     .help = "What bodies are made of; others have the colours of their meshes' materials, or a plain one"},
-};
-
-static const FieldRule render_rules[] = {{"sun", check_sun}, {"fieldMin|fieldMax", check_field_range}};
-
-static const ObjectType render_type = {.help = "How frames are drawn. Present: `skiff run` draws them",
-                                       .fields = render_fields,
-                                       .field_count = COUNT(render_fields),
-                                       .size = sizeof(SceneRender),
-                                       .init = init_render,
-                                       .rules = render_rules,
-                                       .rule_count = COUNT(render_rules)};
+static const ObjectType key_type = {.help = "A key and what it does",
+                                    .fields = key_fields,
+                                    .field_count = COUNT(key_fields),
+                                    .size = sizeof(ScriptKey),
+                                    .init = init_key,
+                                    .variant_key = "action"};
 
 /* ---- The file ---- */
 
 static void init_file(void *object) {
-    *(SceneFile *)object = (SceneFile){.version = 1, .title = "", .description = ""};
+    SceneFile *file = object;
+    *file = (SceneFile){.version = 1, .title = "", .description = ""};
+    file->keys.items = (void *)(uintptr_t)script_default_keys(&file->keys.count);
+}
+
+static void check_keys(void *object, Problems *problems) {
+    const SceneFile *file = object;
+    const ScriptKey *keys = file->keys.items;
+    for (int i = 0; i < file->keys.count; i++)
+        for (int j = 0; j < i; j++)
+            if (strcmp(keys[i].key, keys[j].key) == 0) {
+                const size_t mark = problems_enter(problems, "Keys");
+                problems_enter_index(problems, (size_t)i);
+                problems_add(problems, "key %s is bound by Keys[%d] already", keys[i].key, j);
+                problems_leave(problems, mark);
+            }
 }
 
 static const Field file_fields[] = {
@@ -743,12 +609,20 @@ static const Field file_fields[] = {
      .help = "Solids in the fluid; they do not touch each other or the tank"},
     {ROW(FIELD_LIST, SceneFile, probes, "Probes"), .max = 10000, .object = &probe_type,
      .help = "Measurements"},
-    {ROW(FIELD_OBJECT, SceneFile, render, "Render"), .flags = FIELD_NULLABLE, .object = &render_type,
+    {ROW(FIELD_FILE, SceneFile, input, "input"), .flags = FIELD_NULLABLE,
+     .help = "Input file that drives, relative to the scene; `skiff run --input` takes its place"},
+    {ROW(FIELD_LIST, SceneFile, keys, "Keys"), .max = SCRIPT_MAX_KEYS, .object = &key_type,
+     .help = "Keys that input files can press; absent: w s a d, z q and the arrows"},
+    {ROW(FIELD_OBJECT, SceneFile, render, "Render"), .flags = FIELD_NULLABLE, .object = &scene_render_type,
      .help = "Frames; absent: none, unless the command line asks for them"},
 };
+
+static const FieldRule file_rules[] = {{"Keys", check_keys}};
 
 const ObjectType scene_file_type = {.help = "A Skiff scene",
                                     .fields = file_fields,
                                     .field_count = COUNT(file_fields),
                                     .size = sizeof(SceneFile),
-                                    .init = init_file};
+                                    .init = init_file,
+                                    .rules = file_rules,
+                                    .rule_count = COUNT(file_rules)};

@@ -5,6 +5,7 @@
 
 #include "engine/skiff.h"
 #include "field.h"
+#include "script.h"
 
 typedef struct SceneConfiguration {
     SkiffParams params;
@@ -60,6 +61,7 @@ typedef struct SceneBody {
     bool is_dynamic;
     uint32_t free_axes; /* UINT32_MAX: absent */
     double release_time;
+    SkiffDriveDef *drive; /* NULL: absent */
 } SceneBody;
 
 typedef struct SceneProbe {
@@ -128,6 +130,8 @@ typedef struct SceneFile {
     FieldList blocks;    /* of SkiffBlockDef */
     FieldList bodies;    /* of SceneBody */
     FieldList probes;    /* of SceneProbe */
+    const char *input;   /* NULL: absent */
+    FieldList keys;      /* of ScriptKey */
     SceneRender *render; /* NULL: absent */
 } SceneFile;
 

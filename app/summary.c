@@ -32,13 +32,17 @@ static int compare_doubles(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
-static double percentile(const double *sorted, size_t count, double percent) {
+void summary_sort(double *values, size_t count) {
+    qsort(values, count, sizeof *values, compare_doubles);
+}
+
+double summary_percentile(const double *sorted, size_t count, double percent) {
     size_t rank = (size_t)ceil(percent / 100.0 * (double)count);
     return sorted[rank > 0 ? rank - 1 : 0];
 }
 
 /* Six digits are more than any of these figures means. */
-static json_t *figure(double value) {
+json_t *summary_figure(double value) {
     char text[32];
     snprintf(text, sizeof text, "%.6g", value);
     return json_text_double(strtod(text, NULL));
@@ -50,10 +54,12 @@ json_t *summary_statistics(double *values, size_t count) {
     double sum = 0;
     for (size_t i = 0; i < count; i++)
         sum += values[i];
-    qsort(values, count, sizeof *values, compare_doubles);
-    return json_pack("{sososososo}", "mean", figure(sum / (double)count), "p50",
-                     figure(percentile(values, count, 50)), "p95", figure(percentile(values, count, 95)),
-                     "p99", figure(percentile(values, count, 99)), "max", figure(values[count - 1]));
+    summary_sort(values, count);
+    return json_pack("{sososososo}", "mean", summary_figure(sum / (double)count), "p50",
+                     summary_figure(summary_percentile(values, count, 50)), "p95",
+                     summary_figure(summary_percentile(values, count, 95)), "p99",
+                     summary_figure(summary_percentile(values, count, 99)), "max",
+                     summary_figure(values[count - 1]));
 }
 
 double summary_real_time_factor(double simulated, double computed_ms) {
@@ -84,6 +90,23 @@ static json_t *milliseconds(const CsvTable *steps) {
     return group;
 }
 
+/* The same of the steps that moved the window, or of those that did not; null where there are none. */
+static json_t *milliseconds_of(const CsvTable *steps, bool moved) {
+    CsvTable part = *steps;
+    const int column = csv_column(steps, "moved");
+    const size_t width = (size_t)steps->column_count;
+    part.row_count = 0;
+    part.values = malloc((steps->row_count * width + 1) * sizeof *part.values);
+    for (size_t row = 0; part.values && column >= 0 && row < steps->row_count; row++) {
+        const double *from = steps->values + row * width;
+        if ((from[column] > 0) == moved)
+            memcpy(part.values + part.row_count++ * width, from, width * sizeof *from);
+    }
+    json_t *group = part.row_count > 0 ? milliseconds(&part) : json_null();
+    free(part.values);
+    return group;
+}
+
 static double column_sum(const CsvTable *steps, const char *name) {
     double *values = csv_copy_column(steps, name), sum = 0;
     for (size_t i = 0; values && i < steps->row_count; i++)
@@ -92,7 +115,19 @@ static double column_sum(const CsvTable *steps, const char *name) {
     return sum;
 }
 
-json_t *summary_make(const Scene *scene, const SkiffSim *sim, const CsvTable *steps, const RunEnd *end) {
+static json_t *cause_counts(const CsvTable *ledger, const char *prefix, int count,
+                            const char *(*key)(int cause)) {
+    json_t *group = json_object();
+    char column[64];
+    for (int i = 0; i < count; i++) {
+        snprintf(column, sizeof column, "%s_%s", prefix, key(i));
+        json_object_set_new(group, key(i), json_integer((json_int_t)column_sum(ledger, column)));
+    }
+    return group;
+}
+
+json_t *summary_make(const Scene *scene, const SkiffSim *sim, const CsvTable *steps, const CsvTable *ledger,
+                     const RunEnd *end) {
     const SkiffStats *stats = skiff_stats(sim);
     Machine machine = machine_describe(sim);
     char hash[20];
@@ -105,15 +140,19 @@ json_t *summary_make(const Scene *scene, const SkiffSim *sim, const CsvTable *st
     json_object_set_new(summary, "time", json_text_double(skiff_time(sim)));
     json_object_set_new(summary, "time_step", json_text_float(skiff_params(sim)->time_step));
     json_object_set_new(summary, "particles", json_integer(skiff_particles(sim).count));
-    json_object_set_new(summary, "emitted", json_integer((json_int_t)column_sum(steps, "emitted")));
-    json_object_set_new(summary, "removed", json_integer((json_int_t)column_sum(steps, "removed")));
+    json_object_set_new(summary, "particles_in", cause_counts(ledger, "in", SKIFF_IN_COUNT, skiff_in_key));
+    json_object_set_new(summary, "particles_out",
+                        cause_counts(ledger, "out", SKIFF_OUT_COUNT, skiff_out_key));
     json_object_set_new(summary, "boundary_samples", json_integer(summary_sample_count(sim)));
     json_object_set_new(summary, "contacts", json_integer(stats->contacts));
     json_object_set_new(summary, "bodies", json_integer(skiff_body_count(sim)));
-    json_object_set_new(summary, "computing_seconds", figure(computed_ms / 1000));
+    json_object_set_new(summary, "computing_seconds", summary_figure(computed_ms / 1000));
     json_object_set_new(summary, "real_time_factor",
-                        figure(summary_real_time_factor(simulated, computed_ms)));
+                        summary_figure(summary_real_time_factor(simulated, computed_ms)));
+    json_object_set_new(summary, "moves", json_integer((json_int_t)column_sum(steps, "moved")));
     json_object_set_new(summary, "ms", milliseconds(steps));
+    json_object_set_new(summary, "ms_without_moves", milliseconds_of(steps, false));
+    json_object_set_new(summary, "ms_with_moves", milliseconds_of(steps, true));
     for (int i = 0; i < COUNT(rows); i++) {
         json_t *group = rows[i].key ? json_object_get(summary, rows[i].group) : summary;
         if (!group) {
@@ -122,8 +161,8 @@ json_t *summary_make(const Scene *scene, const SkiffSim *sim, const CsvTable *st
         }
         add_column(group, rows[i].key ? rows[i].key : rows[i].group, steps, rows[i].column);
     }
-    json_object_set_new(summary, "memory_mb", figure((double)skiff_memory(sim) / 1e6));
-    json_object_set_new(summary, "peak_rss_mb", figure((double)memory_peak() / 1e6));
+    json_object_set_new(summary, "memory_mb", summary_figure((double)skiff_memory(sim) / 1e6));
+    json_object_set_new(summary, "peak_rss_mb", summary_figure((double)memory_peak() / 1e6));
     json_object_set_new(summary, "machine", machine_json(&machine));
     return summary;
 }

@@ -1,4 +1,4 @@
-/* summary.json: what a run came to, from its steps.csv. */
+/* summary.json: what a run came to, from its steps.csv and ledger.csv. */
 #ifndef SKIFF_APP_SUMMARY_H
 #define SKIFF_APP_SUMMARY_H
 
@@ -12,11 +12,19 @@ typedef struct RunEnd {
 } RunEnd;
 
 /* New reference. NULL when memory is exhausted. */
-json_t *summary_make(const Scene *scene, const SkiffSim *sim, const CsvTable *steps, const RunEnd *end);
+json_t *summary_make(const Scene *scene, const SkiffSim *sim, const CsvTable *steps, const CsvTable *ledger,
+                     const RunEnd *end);
 
 /* {"mean":, "p50":, "p95":, "p99":, "max":} of count values, whose order is lost. Percentiles by nearest
  * rank. New reference. */
 json_t *summary_statistics(double *values, size_t count);
+
+void summary_sort(double *values, size_t count); /* ascending */
+/* Nearest rank, of at least one value in ascending order. */
+double summary_percentile(const double *sorted, size_t count, double percent);
+/* A number with six digits, which is more than any measured time means; null when not finite. New reference.
+ */
+json_t *summary_figure(double value);
 
 /* Samples of walls and bodies. */
 uint32_t summary_sample_count(const SkiffSim *sim);

@@ -306,3 +306,67 @@ void svg_chart(FILE *out, const SvgChart *chart) {
     fputs("</figure>\n", out);
     free(plot.lines);
 }
+
+/* ---- Curves with places of their own ---- */
+
+typedef struct Point {
+    double x, y;
+} Point;
+
+static int compare_points(const void *a, const void *b) {
+    const Point *p = a, *q = b;
+    return (p->x > q->x) - (p->x < q->x);
+}
+
+/* The points of a curve by rising x; returns how many there are. */
+static size_t sort_points(const SvgCurve *curve, Point *points) {
+    size_t count = 0;
+    for (size_t i = 0; i < curve->count; i++)
+        if (isfinite(curve->x[i]) && isfinite(curve->y[i]))
+            points[count++] = (Point){curve->x[i], curve->y[i]};
+    qsort(points, count, sizeof *points, compare_points);
+    return count;
+}
+
+static double curve_at(const Point *points, size_t count, double x) {
+    size_t next = 0;
+    while (next < count && points[next].x < x)
+        next++;
+    if (next == count || (next == 0 && points[0].x > x))
+        return NAN;
+    if (points[next].x == x)
+        return points[next].y;
+    const Point *a = &points[next - 1], *b = &points[next];
+    return a->y + (b->y - a->y) * (x - a->x) / (b->x - a->x);
+}
+
+void svg_curves(FILE *out, const SvgChart *labels, const SvgCurve *curves, int curve_count) {
+    SvgChart chart = *labels;
+    size_t total = 0, count = 0, kept = 0;
+    for (int c = 0; c < curve_count; c++)
+        total += curves[c].count;
+    Point *points = malloc((total + 1) * sizeof *points);
+    double *x = malloc((total + 1) * sizeof *x);
+    double *y = malloc((total * (size_t)curve_count + 1) * sizeof *y);
+    for (int c = 0; c < curve_count && points; c++)
+        count += sort_points(&curves[c], points + count);
+    if (points)
+        qsort(points, count, sizeof *points, compare_points);
+    for (size_t i = 0; i < count && x; i++)
+        if (kept == 0 || points[i].x > x[kept - 1])
+            x[kept++] = points[i].x;
+    chart.x = x;
+    chart.count = points && x && y ? kept : 0;
+    chart.series_count = curve_count;
+    for (int c = 0; c < curve_count && chart.count > 0; c++) {
+        const size_t own = sort_points(&curves[c], points);
+        double *series = y + (size_t)c * kept;
+        for (size_t i = 0; i < kept; i++)
+            series[i] = curve_at(points, own, x[i]);
+        chart.series[c] = (SvgSeries){curves[c].name, series};
+    }
+    svg_chart(out, &chart);
+    free(points);
+    free(x);
+    free(y);
+}

@@ -28,6 +28,17 @@ typedef struct SvgChart {
  * hundred intervals. */
 void svg_chart(FILE *out, const SvgChart *chart);
 
+/* A curve with places of its own, in any order. */
+typedef struct SvgCurve {
+    const char *name;
+    const double *x, *y; /* NaN in either: no point */
+    size_t count;
+} SvgCurve;
+
+/* Curves that share no x: like svg_chart with `labels` for title, labels and scales (its data are not used).
+ * Between its points a curve is straight. At most SVG_MAX_SERIES. */
+void svg_curves(FILE *out, const SvgChart *labels, const SvgCurve *curves, int curve_count);
+
 /* Writes text with HTML's special characters escaped. */
 void svg_text(FILE *out, const char *text);
 

@@ -8,7 +8,7 @@
 
 /* ---- Columns ---- */
 
-typedef enum ColumnType { COLUMN_U64, COLUMN_U32, COLUMN_INT, COLUMN_DOUBLE } ColumnType;
+typedef enum ColumnType { COLUMN_U64, COLUMN_U32, COLUMN_INT, COLUMN_BOOL, COLUMN_DOUBLE } ColumnType;
 
 typedef struct Column {
     const char *name;
@@ -36,13 +36,22 @@ static const Column step_columns[] = {
     {"mean_height", COLUMN_DOUBLE, STAT(mean_height), 9},
     {"kinetic", COLUMN_DOUBLE, STAT(kinetic_energy), 9},
     {"potential", COLUMN_DOUBLE, STAT(potential_energy), 9},
-    {"emitted", COLUMN_U32, STAT(emitted), 0},
-    {"removed", COLUMN_U32, STAT(removed), 0},
+    {"moved", COLUMN_BOOL, STAT(moved), 0},
+};
+
+/* What stands before and after the counts by cause. */
+static const Column ledger_columns[] = {
+    {"step", COLUMN_U64, STAT(step), 0},
+    {"t", COLUMN_DOUBLE, STAT(time), 8},
+    {"particles", COLUMN_U32, STAT(particles), 0},
+    {"mean_height", COLUMN_DOUBLE, STAT(mean_height), 9},
+    {"kinetic", COLUMN_DOUBLE, STAT(kinetic_energy), 9},
+    {"potential", COLUMN_DOUBLE, STAT(potential_energy), 9},
 };
 
 typedef struct HullColumn {
     const char *name;
-    size_t offset; /* of a double in SkiffBody */
+    size_t offset; /* of a double in SkiffBody or SkiffDrive */
 } HullColumn;
 
 #define HULL(name, member, index)                                                                            \
@@ -70,6 +79,16 @@ static const HullColumn hull_columns[] = {
     HULL("tz", torque, 2),
 };
 
+/* Of a body that has a drive, after its hull_columns. */
+static const HullColumn drive_columns[] = {
+    {"throttle", offsetof(SkiffDrive, controls.throttle)},
+    {"thrust", offsetof(SkiffDrive, thrust)},
+    {"rudder", offsetof(SkiffDrive, rudder)},
+    {"steering", offsetof(SkiffDrive, torque)},
+    {"heading", offsetof(SkiffDrive, heading)},
+    {"speed", offsetof(SkiffDrive, speed)},
+};
+
 /* ---- Headers; malloc'ed ---- */
 
 static char *steps_header(void) {
@@ -86,6 +105,29 @@ static char *steps_header(void) {
     return fclose(stream) == 0 ? text : NULL;
 }
 
+static char *ledger_header(void) {
+    char *text = NULL;
+    size_t size;
+    FILE *stream = open_memstream(&text, &size);
+    if (!stream)
+        return NULL;
+    for (int i = 0; i < COUNT(ledger_columns); i++)
+        fprintf(stream, "%s%s", i > 0 ? "," : "", ledger_columns[i].name);
+    for (int i = 0; i < SKIFF_IN_COUNT; i++)
+        fprintf(stream, ",in_%s", skiff_in_key(i));
+    for (int i = 0; i < SKIFF_OUT_COUNT; i++)
+        fprintf(stream, ",out_%s", skiff_out_key(i));
+    return fclose(stream) == 0 ? text : NULL;
+}
+
+/* Number of the drive that a body has, or -1. */
+static int drive_of(const SkiffSim *sim, int body) {
+    for (int d = 0; d < skiff_drive_count(sim); d++)
+        if (skiff_drive(sim, d).body == body)
+            return d;
+    return -1;
+}
+
 static char *hull_header(const SkiffSim *sim) {
     char *text = NULL;
     size_t size;
@@ -93,9 +135,13 @@ static char *hull_header(const SkiffSim *sim) {
     if (!stream)
         return NULL;
     fputs("step,t", stream);
-    for (int body = 0; body < skiff_body_count(sim); body++)
+    for (int body = 0; body < skiff_body_count(sim); body++) {
+        const char *name = skiff_body(sim, body).name;
         for (int i = 0; i < COUNT(hull_columns); i++)
-            fprintf(stream, ",%s.%s", skiff_body(sim, body).name, hull_columns[i].name);
+            fprintf(stream, ",%s.%s", name, hull_columns[i].name);
+        for (int i = 0; drive_of(sim, body) >= 0 && i < COUNT(drive_columns); i++)
+            fprintf(stream, ",%s.%s", name, drive_columns[i].name);
+    }
     return fclose(stream) == 0 ? text : NULL;
 }
 
@@ -125,6 +171,9 @@ static void put_column(CsvWriter *writer, const Column *column, const SkiffStats
     case COLUMN_INT:
         csv_put(writer, *(const int *)(const void *)member, 9);
         break;
+    case COLUMN_BOOL:
+        csv_put_count(writer, *(const bool *)(const void *)member);
+        break;
     case COLUMN_DOUBLE:
         csv_put(writer, *(const double *)(const void *)member, column->digits);
         break;
@@ -140,13 +189,32 @@ static void add_step(CsvWriter *writer, const SkiffStats *stats) {
     csv_end_row(writer);
 }
 
+static void add_ledger(CsvWriter *writer, const SkiffStats *stats) {
+    for (int i = 0; i < COUNT(ledger_columns); i++)
+        put_column(writer, &ledger_columns[i], stats);
+    for (int i = 0; i < SKIFF_IN_COUNT; i++)
+        csv_put_count(writer, stats->particles_in[i]);
+    for (int i = 0; i < SKIFF_OUT_COUNT; i++)
+        csv_put_count(writer, stats->particles_out[i]);
+    csv_end_row(writer);
+}
+
+static void put_hull(CsvWriter *writer, const HullColumn *columns, int count, const void *object) {
+    for (int i = 0; i < count; i++)
+        csv_put(writer, *(const double *)(const void *)((const char *)object + columns[i].offset), 9);
+}
+
 static void add_bodies(CsvWriter *writer, const SkiffSim *sim) {
     csv_put_count(writer, skiff_step_count(sim));
     csv_put(writer, skiff_time(sim), 8);
     for (int index = 0; index < skiff_body_count(sim); index++) {
-        SkiffBody body = skiff_body(sim, index);
-        for (int i = 0; i < COUNT(hull_columns); i++)
-            csv_put(writer, *(const double *)(const void *)((const char *)&body + hull_columns[i].offset), 9);
+        const SkiffBody body = skiff_body(sim, index);
+        const int number = drive_of(sim, index);
+        put_hull(writer, hull_columns, COUNT(hull_columns), &body);
+        if (number < 0)
+            continue;
+        const SkiffDrive drive = skiff_drive(sim, number);
+        put_hull(writer, drive_columns, COUNT(drive_columns), &drive);
     }
     csv_end_row(writer);
 }
@@ -162,6 +230,7 @@ static bool is_probe_due(const Tables *tables, const SkiffSim *sim) {
 
 void tables_add(Tables *tables, const SkiffSim *sim) {
     add_step(&tables->steps, skiff_stats(sim));
+    add_ledger(&tables->ledger, skiff_stats(sim));
     if (tables->hull.stream)
         add_bodies(&tables->hull, sim);
     if (!tables->probes.stream || !is_probe_due(tables, sim))
@@ -206,9 +275,10 @@ static bool tables_open(Tables *tables, const char *folder, const SkiffSim *sim,
     double time = skiff_time(sim) + 0.25 * (double)skiff_params(sim)->time_step;
     *tables = (Tables){.probe_rate = probe_rate, .probe_count = skiff_probe_channel_count(sim)};
     tables->probe_values = calloc((size_t)tables->probe_count + 1, sizeof *tables->probe_values);
-    TableFile files[3];
+    TableFile files[4];
     int count = 0;
     files[count++] = (TableFile){&tables->steps, "steps.csv", steps_header(), step, true};
+    files[count++] = (TableFile){&tables->ledger, "ledger.csv", ledger_header(), step, true};
     if (skiff_body_count(sim) > 0)
         files[count++] = (TableFile){&tables->hull, "hull.csv", hull_header(sim), step, true};
     if (tables->probe_count > 0)
@@ -232,15 +302,16 @@ bool tables_resume(Tables *tables, const char *folder, const SkiffSim *sim, doub
 }
 
 bool tables_flush(Tables *tables, bool durable, Err *err) {
-    return csv_flush(&tables->steps, durable, err) && csv_flush(&tables->hull, durable, err) &&
-           csv_flush(&tables->probes, durable, err);
+    return csv_flush(&tables->steps, durable, err) && csv_flush(&tables->ledger, durable, err) &&
+           csv_flush(&tables->hull, durable, err) && csv_flush(&tables->probes, durable, err);
 }
 
 bool tables_close(Tables *tables, Err *err) {
-    bool steps = csv_close(&tables->steps, err);
-    bool hull = csv_close(&tables->hull, steps ? err : NULL);
-    bool probes = csv_close(&tables->probes, steps && hull ? err : NULL);
+    CsvWriter *writers[] = {&tables->steps, &tables->ledger, &tables->hull, &tables->probes};
+    bool good = true;
+    for (int i = 0; i < COUNT(writers); i++)
+        good = csv_close(writers[i], good ? err : NULL) && good;
     free(tables->probe_values);
     tables->probe_values = NULL;
-    return steps && hull && probes;
+    return good;
 }

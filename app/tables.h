@@ -1,5 +1,5 @@
-/* The CSV files of a run: steps.csv (a row a step), hull.csv (bodies), probes.csv (at the scene's rate).
- * Columns are listed once, in tables.c. */
+/* The CSV files of a run: steps.csv (a row a step), ledger.csv (particles in and out by cause), hull.csv
+ * (bodies and drives), probes.csv (at the scene's rate). Columns are listed once, in tables.c. */
 #ifndef SKIFF_APP_TABLES_H
 #define SKIFF_APP_TABLES_H
 
@@ -8,8 +8,9 @@
 #include "engine/skiff.h"
 
 typedef struct Tables {
-    CsvWriter steps, hull, probes; /* hull and probes only where the scene has bodies and probes */
-    double probe_rate;             /* Hz; 0: every step */
+    CsvWriter steps, ledger;
+    CsvWriter hull, probes; /* hull and probes only where the scene has bodies and probes */
+    double probe_rate;      /* Hz; 0: every step */
     double *probe_values;
     int probe_count;
 } Tables;

@@ -141,11 +141,14 @@ static bool unknown_body(const View *view, const char *list, int index, const ch
 
 /* ---- Cameras ---- */
 
-/* Where the body's bow points at the start, world axes: boats point towards -x in their own frame, as in
- * [Carensac2023]. */
+/* Where the body's bow points at the start, world axes: along the axis of its drive, or where boats without
+ * one point, to -x in their own frame [Carensac2023]. */
 static void bow_of(const SkiffDef *def, int body, double bow[3]) {
     const SkiffGeometryDef *geometry = &def->bodies[body].geometry;
-    const double own[3] = {-1, 0, 0};
+    const SkiffDriveDef *drive = def->bodies[body].drive;
+    double own[3] = {-1, 0, 0};
+    for (int k = 0; drive && k < 3; k++)
+        own[k] = (double)drive->axis[k];
     double axis[3], half = 0.5 * (double)geometry->rotation_angle, length = 0;
     for (int k = 0; k < 3; k++) {
         axis[k] = (double)geometry->rotation_axis[k];
@@ -154,8 +157,8 @@ static void bow_of(const SkiffDef *def, int body, double bow[3]) {
     double scale = length > 0 ? sin(half) / sqrt(length) : 0;
     const double q[4] = {scale * axis[0], scale * axis[1], scale * axis[2], length > 0 ? cos(half) : 1};
     gfx_camera_rotate(q, own, bow);
-    if (hypot(bow[0], bow[2]) < 1e-6) /* upright: any course will do */
-        memcpy(bow, own, sizeof own);
+    if (hypot(bow[0], bow[2]) < 1e-6 * fabs(bow[1])) /* upright: any course will do */
+        bow[0] = 1;
 }
 
 static void keep(double *value, float given) {
@@ -700,7 +703,7 @@ static void skip_to(const View *view, Sequence *sequence, double time) {
         sequence->next++;
 }
 
-bool view_begin(View *view, const SkiffSim *sim, const char *output, Err *err) {
+bool view_begin(View *view, const SkiffSim *sim, const ViewControls *controls, const char *output, Err *err) {
     const SceneRender *render = &view->options.render;
     char path[PATH_SIZE];
     snprintf(view->output, sizeof view->output, "%.4000s", output);
@@ -731,8 +734,7 @@ bool view_begin(View *view, const SkiffSim *sim, const char *output, Err *err) {
         skip_to(view, &view->save, skiff_time(sim));
         return !view->video || add_old_frames(view, err);
     }
-    ViewControls controls = view_controls_none();
-    return catch_up(view, sim, NULL, &controls, err);
+    return catch_up(view, sim, NULL, controls, err);
 }
 
 bool view_step(View *view, const SkiffSim *sim, const ViewControls *controls, Err *err) {

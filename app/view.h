@@ -25,10 +25,10 @@ View *view_create(const ViewOptions *options, const Scene *scene, const SkiffSim
 /* ERR_INPUT with the names there are, when there is no such camera. */
 bool view_check_camera(const View *view, const char *name, Err *err);
 
-/* Begins `output`/frames, video.mp4 and particles/, as the options ask, at the time of `sim` (NULL:
- * saved frames follow). Frame 1 is the scene's start. A resumed film begins with the frames
+/* Begins `output`/frames, video.mp4 and particles/, as the options ask, at the time of `sim` (NULL,
+ * as `controls`: saved frames follow). Frame 1 is the scene's start. A resumed film begins with the frames
  * that are there already. */
-bool view_begin(View *view, const SkiffSim *sim, const char *output, Err *err);
+bool view_begin(View *view, const SkiffSim *sim, const ViewControls *controls, const char *output, Err *err);
 
 /* After every step: draws and saves every frame whose time lies in it. */
 bool view_step(View *view, const SkiffSim *sim, const ViewControls *controls, Err *err);

@@ -63,7 +63,47 @@ static uint32_t occupied(const SkiffSim *sim, const float first[3], const double
     return UINT32_MAX;
 }
 
-static bool emit_one(SkiffSim *sim, int index, uint32_t *emitted, Err *err) {
+/* ---- Water at rest ---- */
+
+typedef struct RestBlock {
+    GridBounds bounds; /* window-local */
+} RestBlock;
+
+static RestPlace block_place(const void *user, const float p[3]) {
+    const RestBlock *block = user;
+    for (int k = 0; k < 3; k++)
+        if (!(p[k] >= block->bounds.min[k] && p[k] < block->bounds.max[k]))
+            return REST_IN_AIR;
+    return REST_IN_WATER;
+}
+
+static bool emit_rest(SkiffSim *sim, int index, uint32_t *emitted, Err *err) {
+    const SkiffBlockDef *def = &sim->blocks[index].def;
+    RestBlock block;
+    RestRequest request = {.place = block_place, .user = &block, .birth = sim->time};
+    for (int k = 0; k < 3; k++) {
+        block.bounds.min[k] = (float)((double)def->start[k] - sim->origin[k]);
+        block.bounds.max[k] = (float)((double)def->end[k] - sim->origin[k]);
+        request.offset[k] = (double)def->offset[k];
+    }
+    request.bounds = block.bounds;
+    request.surface = block.bounds.max[1];
+    const uint32_t before = sim->particles.count;
+    if (!rest_fill(sim, &request, &sim->fill, err)) {
+        err_prefix(err, "FluidBlocks[%d]", index);
+        return false;
+    }
+    if (sim->particles.count == before)
+        return err_add(err, ERR_INPUT, "FluidBlocks[%d]: there is no room for water in it", index);
+    for (uint32_t i = before; i < sim->particles.count; i++)
+        memcpy(sim->particles.velocity[i], def->velocity, sizeof def->velocity);
+    *emitted += sim->particles.count - before;
+    return true;
+}
+
+/* ---- Lattices ---- */
+
+static bool emit_lattice(SkiffSim *sim, int index, uint32_t *emitted, Err *err) {
     const SkiffBlockDef *def = &sim->blocks[index].def;
     const float spacing = 2.0f * sim->params.particle_radius;
     double counts[3];
@@ -118,7 +158,8 @@ bool block_emit(SkiffSim *sim, uint32_t *emitted, Err *err) {
         EmitBlock *block = &sim->blocks[k];
         while (good && block->done < block->def.repeat &&
                block->def.time + block->done * block->def.period <= sim->time + 1e-9) {
-            good = emit_one(sim, k, emitted, err);
+            good = block->def.fill == SKIFF_FILL_REST ? emit_rest(sim, k, emitted, err)
+                                                      : emit_lattice(sim, k, emitted, err);
             block->done++;
         }
     }

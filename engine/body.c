@@ -15,7 +15,7 @@ void matrix_times(const double m[3][3], const double v[3], double result[3]) {
     memcpy(result, r, sizeof r);
 }
 
-static void quaternion_matrix(const double q[4], double m[3][3]) {
+void quaternion_matrix(const double q[4], double m[3][3]) {
     const double x = q[0], y = q[1], z = q[2], w = q[3];
     const double r[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)},
                             {2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)},

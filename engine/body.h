@@ -44,6 +44,7 @@ void body_push(Body *body, const float gravity[3], double time, double dt);
 void body_advance(Body *body, double time, double dt);
 bool body_held(const Body *body, double time);
 
+void quaternion_matrix(const double q[4], double m[3][3]);
 void matrix_times(const double m[3][3], const double v[3], double result[3]);
 
 #endif

@@ -30,7 +30,7 @@ static const double SAFETY = 0.4;
 
 bool dfsph_reserve(Dfsph *dfsph, uint32_t particle_capacity, uint32_t object_count, Err *err) {
     const size_t padded = particle_capacity + BLOCK, blocks = padded / BLOCK;
-    const size_t bytes = padded * (2 * sizeof(Float4) + 7 * sizeof(float)) +
+    const size_t bytes = padded * (4 * sizeof(Float4) + 7 * sizeof(float)) +
                          blocks * DFSPH_SUMS * sizeof(double) + (size_t)object_count * 12 * sizeof(double);
     if (!buffer_reserve(&dfsph->buffer, "pressure solver", bytes, err))
         return false;
@@ -40,6 +40,8 @@ bool dfsph_reserve(Dfsph *dfsph, uint32_t particle_capacity, uint32_t object_cou
     next += (count) * sizeof *dfsph->field
     TAKE(acceleration, padded);
     TAKE(guess, padded);
+    TAKE(spare[0], padded);
+    TAKE(spare[1], padded);
     TAKE(partials, blocks * DFSPH_SUMS);
     TAKE(impulses, object_count);
     TAKE(responses, object_count);
@@ -88,12 +90,21 @@ static void total_partials(const Dfsph *dfsph, uint32_t blocks, int count, doubl
 
 /* ---- The operator ---- */
 
+/* What is held answers no pressure. */
+static void hold_block(const uint8_t *held, const AccelerateJob *job, uint32_t block) {
+    for (uint32_t i = block * BLOCK; i < (block + 1) * BLOCK; i++)
+        for (int k = 0; held[i] && k < 4; k++)
+            job->result[i][k] = job->base != NULL ? job->base[i][k] : 0.0f;
+}
+
 /* job->result = job->base + job->scale D^T job->p for the fluid, responses = D^T job->p for the bodies. */
 static void apply_transpose(Dfsph *dfsph, const DfsphProblem *problem, const AccelerateJob *job) {
     const uint32_t blocks = particles_blocks(problem->particles);
     const PairData *pairs = &problem->rows->pairs;
     EACH_BLOCK {
         problem->passes->accelerate(pairs, job, block);
+        if (problem->held != NULL)
+            hold_block(problem->held, job, block);
     }
     if (!dfsph->moving)
         return;
@@ -230,8 +241,9 @@ static void predict_density(const Dfsph *dfsph, const DfsphProblem *problem) {
     const float *density = problem->rows->pairs.density;
     EACH_BLOCK {
         for (uint32_t i = block * BLOCK; i < (block + 1) * BLOCK; i++)
-            problem->particles->prediction[i] =
-                dfsph->inv_diagonal[i] > 0.0f ? density[i] + dfsph->residual[i] - dfsph->source[i] : 0.0f;
+            if (problem->held == NULL || !problem->held[i])
+                problem->particles->prediction[i] =
+                    dfsph->inv_diagonal[i] > 0.0f ? density[i] + dfsph->residual[i] - dfsph->source[i] : 0.0f;
     }
 }
 
@@ -246,9 +258,10 @@ static void prepare(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, f
     EACH_BLOCK {
         for (uint32_t i = block * BLOCK; i < (block + 1) * BLOCK; i++) {
             const bool few = kind == SOLVE_DIVERGENCE && problem->rows->neighbours[i] < MIN_NEIGHBOURS;
-            const bool takes_part = i < count && gradient_sum[i][3] > MIN_DIAGONAL && !few;
+            const bool held = problem->held != NULL && problem->held[i];
+            const bool takes_part = i < count && gradient_sum[i][3] > MIN_DIAGONAL && !few && !held;
             dfsph->inv_diagonal[i] = takes_part ? 1.0f / gradient_sum[i][3] : 0.0f;
-            if (problem->frozen == NULL || !problem->frozen[i])
+            if (!held)
                 p[i] = takes_part && p[i] > 0.0f ? warm * p[i] : 0.0f;
             /* divergence: where there is room to the rest density, approaching is no fault: thin water falls
              * together freely */

@@ -16,6 +16,7 @@ typedef struct SolveResult {
 typedef struct Dfsph {
     Float4 *acceleration; /* D^T p */
     Float4 *guess;        /* velocity after the pressure so far */
+    Float4 *spare[2];     /* for others between the solves, as are the two above */
     float *residual, *preconditioned, *direction, *image, *new_image, *inv_diagonal;
     float *source;          /* what stands beside dt D v: relative density */
     double *partials;       /* [blocks][DFSPH_SUMS] */
@@ -36,8 +37,8 @@ typedef struct DfsphProblem {
     Body *bodies;
     int body_count;
     Particles *particles;
-    const uint8_t *frozen;    /* NULL, or [particles] 1: has no row, does not move, and keeps its pressure */
-    uint32_t evaluated_count; /* particles that are not frozen: errors are means over these */
+    const uint8_t *held;      /* NULL, or [particles] 1: keeps velocity and pressure, with a row or without */
+    uint32_t evaluated_count; /* particles that are not held: errors are means over these */
     int threads;
 } DfsphProblem;
 

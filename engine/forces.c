@@ -67,27 +67,46 @@ static void apply_friction(SkiffSim *sim) {
     }
 }
 
-void forces_apply(SkiffSim *sim) {
-    const float dt = sim->params.time_step;
-    const float *g = sim->params.gravity;
-    const ForceJob job = {.pairs = &sim->rows.pairs,
-                          .velocity = (const Float4 *)sim->particles.velocity,
-                          .result = sim->dfsph.guess,
-                          .gravity_dt = {dt * g[0], dt * g[1], dt * g[2]},
-                          .viscosity = sim->params.viscosity};
-    const uint32_t blocks = particles_blocks(&sim->particles);
-#pragma omp parallel num_threads(sim->threads)
+void forces_apply_fluid(const DfsphProblem *problem, Dfsph *dfsph) {
+    const SkiffParams *params = problem->params;
+    const float dt = params->time_step;
+    Particles *particles = problem->particles;
+    Float4 *gradient[3] = {dfsph->acceleration, dfsph->spare[0], dfsph->spare[1]};
+    const StrainJob strain = {.pairs = &problem->rows->pairs,
+                              .velocity = (const Float4 *)particles->velocity,
+                              .gradient = {gradient[0], gradient[1], gradient[2]}};
+    const ForceJob job = {
+        .pairs = &problem->rows->pairs,
+        .velocity = (const Float4 *)particles->velocity,
+        .result = dfsph->guess,
+        .gravity_dt = {dt * params->gravity[0], dt * params->gravity[1], dt * params->gravity[2]},
+        .viscosity = params->viscosity,
+        .calming = params->calming,
+        .calming_limit = dt * params->calming_limit,
+        .gradient = {(const Float4 *)gradient[0], (const Float4 *)gradient[1], (const Float4 *)gradient[2]}};
+    const uint32_t blocks = particles_blocks(particles);
+#pragma omp parallel num_threads(problem->threads)
     {
+        if (params->calming > 0.0f) {
+#pragma omp for schedule(static)
+            for (uint32_t block = 0; block < blocks; block++)
+                problem->passes->strain(&strain, block);
+        }
 #pragma omp for schedule(static)
         for (uint32_t block = 0; block < blocks; block++)
-            sim->passes->forces(&job, block);
+            problem->passes->forces(&job, block);
 #pragma omp for schedule(static)
-        for (uint32_t block = 0; block < blocks; block++)
-            memcpy(sim->particles.velocity + (size_t)block * BLOCK, sim->dfsph.guess + (size_t)block * BLOCK,
-                   BLOCK * sizeof(Float4));
+        for (uint32_t i = 0; i < particles->count; i++)
+            if (problem->held == NULL || !problem->held[i])
+                memcpy(particles->velocity[i], dfsph->guess[i], sizeof(Float4));
     }
+}
+
+void forces_apply(SkiffSim *sim, const DfsphProblem *problem) {
+    const float dt = sim->params.time_step;
+    forces_apply_fluid(problem, &sim->dfsph);
     for (int b = 0; b < sim->body_count; b++)
-        body_push(&sim->bodies[b], g, sim->time, (double)dt);
+        body_push(&sim->bodies[b], sim->params.gravity, sim->time, (double)dt);
     if (sim->params.wall_friction > 0.0f)
         apply_friction(sim);
 }

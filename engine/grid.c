@@ -30,19 +30,22 @@ static void grid_bounds(const Particles *particles, GridBounds *bounds, int thre
 
 bool grid_layout(CellGrid *cells, const GridBounds *bounds, float cell_size, int margin) {
     double total = 1.0;
+    cells->inv_size = 1.0f / cell_size;
     for (int k = 0; k < 3; k++) {
         /* origins on multiples of the cell size: a particle changes cell only when it moves, not when the
          * bounds do */
-        const double low = floor((double)bounds->min[k] / cell_size) - margin;
+        double low = floor((double)bounds->min[k] / cell_size) - margin;
         const double high = floor((double)bounds->max[k] / cell_size) + margin;
         if (!(high - low < (double)GRID_MAX_CELLS))
             return false;
         cells->origin[k] = (float)(low * cell_size);
+        /* rounding may put the lowest point into the cell below, which is the margin's: one cell more then */
+        if ((bounds->min[k] - cells->origin[k]) * cells->inv_size < (float)margin)
+            cells->origin[k] = (float)(--low * cell_size);
         /* one more for rounding between the origin and the bounds */
         cells->size[k] = (int32_t)(high - low) + 2;
         total *= cells->size[k];
     }
-    cells->inv_size = 1.0f / cell_size;
     return total <= GRID_MAX_CELLS;
 }
 

@@ -431,33 +431,149 @@ static void divergence(const PairData *pairs, const Float4 *v, float *result, ui
         divergence_slices(pairs, v, result, block, false);
 }
 
-/* ---- Gravity and viscosity ---- */
+/* ---- Gravity, viscosity and calming ---- */
+
+static inline Vf vf_load_weight(const PairData *pairs, uint32_t entry) {
+    return vf_load_i16(pairs->weights + (size_t)entry * SLICE);
+}
+
+/* Distances x_j - x_i of a slice's neighbours in units of the support radius. */
+static inline void gather_arms(const PairData *pairs, uint32_t entry, const Float4 *slice_position,
+                               const Vf own[3], Vf arm[3]) {
+    Vf x, y, z, unused;
+    gather_neighbours(slice_position, pairs->entries, entry, pairs->wide, &x, &y, &z, &unused);
+    const Vf unit = vf_set(pairs->kernel.inv_support);
+    arm[0] = vf_mul(unit, vf_sub(x, own[0]));
+    arm[1] = vf_mul(unit, vf_sub(y, own[1]));
+    arm[2] = vf_mul(unit, vf_sub(z, own[2]));
+}
+
+/* A = [sum w (v_j - v_i) d^T] [sum w d d^T + small I]^-1, w = W_ij / W(0), d in supports. `small` keeps the
+ * inverse tame where neighbours lie in a plane or a line. */
+static void strain(const StrainJob *job, uint32_t block) {
+    const PairData *pairs = job->pairs;
+    const Vf small = vf_set(0.008f * 32767.0f);
+    for (uint32_t slice = block * BLOCK_SLICES; slice < (block + 1) * BLOCK_SLICES; slice++) {
+        const uint32_t first = slice * SLICE, begin = pairs->slice_start[slice];
+        Vf own_x[3], own_v[3], unused;
+        vf_load4(pairs->position + first, &own_x[0], &own_x[1], &own_x[2], &unused);
+        vf_load4(job->velocity + first, &own_v[0], &own_v[1], &own_v[2], &unused);
+        Vf xx = small, yy = small, zz = small, xy = vf_zero(), xz = vf_zero(), yz = vf_zero();
+        Vf b[3][3];
+        for (int r = 0; r < 3; r++)
+            for (int c = 0; c < 3; c++)
+                b[r][c] = vf_zero();
+        for (uint32_t entry = begin; entry < begin + pairs->slice_length[slice]; entry++) {
+            __builtin_prefetch(pairs->weights + (size_t)(entry + PREFETCH_ENTRIES) * SLICE);
+            prefetch_entry(pairs->entries, entry + PREFETCH_ENTRIES, pairs->wide);
+            Vf d[3], v[3], wd[3];
+            gather_arms(pairs, entry, pairs->position + first, own_x, d);
+            gather_neighbours(job->velocity + first, pairs->entries, entry, pairs->wide, &v[0], &v[1], &v[2],
+                              &unused);
+            const Vf weight = vf_load_weight(pairs, entry);
+            for (int k = 0; k < 3; k++) {
+                v[k] = vf_sub(v[k], own_v[k]);
+                wd[k] = vf_mul(weight, d[k]);
+            }
+            xx = vf_fma(wd[0], d[0], xx);
+            yy = vf_fma(wd[1], d[1], yy);
+            zz = vf_fma(wd[2], d[2], zz);
+            xy = vf_fma(wd[0], d[1], xy);
+            xz = vf_fma(wd[0], d[2], xz);
+            yz = vf_fma(wd[1], d[2], yz);
+            for (int r = 0; r < 3; r++)
+                for (int c = 0; c < 3; c++)
+                    b[r][c] = vf_fma(v[r], wd[c], b[r][c]);
+        }
+        /* adjugate of the symmetric matrix, over the determinant */
+        const Vf cxx = vf_fma(yy, zz, vf_mul(vf_sub(vf_zero(), yz), yz));
+        const Vf cyy = vf_fma(xx, zz, vf_mul(vf_sub(vf_zero(), xz), xz));
+        const Vf czz = vf_fma(xx, yy, vf_mul(vf_sub(vf_zero(), xy), xy));
+        const Vf cxy = vf_fma(xz, yz, vf_mul(vf_sub(vf_zero(), xy), zz));
+        const Vf cxz = vf_fma(xy, yz, vf_mul(vf_sub(vf_zero(), xz), yy));
+        const Vf cyz = vf_fma(xy, xz, vf_mul(vf_sub(vf_zero(), yz), xx));
+        const Vf root = vf_rsqrt(vf_fma(xx, cxx, vf_fma(xy, cxy, vf_mul(xz, cxz))));
+        const Vf inv = vf_mul(root, root);
+        const Vf columns[3][3] = {{cxx, cxy, cxz}, {cxy, cyy, cyz}, {cxz, cyz, czz}};
+        for (int c = 0; c < 3; c++) {
+            Vf a[3];
+            for (int r = 0; r < 3; r++)
+                a[r] = vf_mul(inv, vf_fma(b[r][0], columns[c][0],
+                                          vf_fma(b[r][1], columns[c][1], vf_mul(b[r][2], columns[c][2]))));
+            vf_store4(job->gradient[c] + first, a[0], a[1], a[2], vf_zero());
+        }
+    }
+}
+
+/* Adds one neighbour's share of calming to sum: w min(1, limit / |e|) e, where e = v_i - v_j + (A_i + A_j) d
+ * / 2 is what the two velocities differ by beyond the linear field between them. */
+static inline void calm_pair(const ForceJob *job, uint32_t entry, uint32_t first, const Vf own_x[3],
+                             const Vf own_a[3][3], Vf weight, Vf e[3], Vf sum[3]) {
+    const PairData *pairs = job->pairs;
+    Vf d[3], unused, size = vf_set(1e-12f);
+    gather_arms(pairs, entry, pairs->position + first, own_x, d);
+    const Vf half = vf_set(0.5f);
+    for (int c = 0; c < 3; c++) {
+        Vf a[3];
+        gather_neighbours(job->gradient[c] + first, pairs->entries, entry, pairs->wide, &a[0], &a[1], &a[2],
+                          &unused);
+        const Vf half_d = vf_mul(half, d[c]);
+        for (int k = 0; k < 3; k++)
+            e[k] = vf_fma(vf_add(own_a[c][k], a[k]), half_d, e[k]);
+    }
+    for (int k = 0; k < 3; k++)
+        size = vf_fma(e[k], e[k], size);
+    const Vf limited = vf_mul(vf_set(job->calming_limit), vf_rsqrt(size)), one = vf_set(1.0f);
+    const Vf share = vf_mul(weight, vf_select(vf_less(limited, one), limited, one));
+    for (int k = 0; k < 3; k++)
+        sum[k] = vf_fma(share, e[k], sum[k]);
+}
 
 /* XSPH [Schechter & Bridson 2012] without its division by the density: that makes the weights symmetric, and
  * what i gives j gets. The weights come from the search, in a stream of their own: making them again from the
- * positions costs twice this pass. */
-static void forces(const ForceJob *job, uint32_t block) {
+ * positions costs twice this pass. Calming does the same to what is left of the difference when the linear
+ * fields around both are taken out, so that it meets disorder and spares waves; being antisymmetric in the
+ * two as well it keeps momentum too. */
+static inline void forces_slices(const ForceJob *job, uint32_t block, const bool calm) {
     const PairData *pairs = job->pairs;
-    const Vf share = vf_set(-job->viscosity * pairs->volume * pairs->kernel.w_scale / 32767.0f);
+    const Vf unit = vf_set(-pairs->volume * pairs->kernel.w_scale / 32767.0f);
+    const Vf viscous = vf_mul(unit, vf_set(job->viscosity)), calming = vf_mul(unit, vf_set(job->calming));
     for (uint32_t slice = block * BLOCK_SLICES; slice < (block + 1) * BLOCK_SLICES; slice++) {
         const uint32_t first = slice * SLICE, begin = pairs->slice_start[slice];
-        Vf vx, vy, vz, w, x, y, z;
-        Vf sx = vf_zero(), sy = vf_zero(), sz = vf_zero();
-        vf_load4(job->velocity + first, &vx, &vy, &vz, &w);
-        const uint32_t length = job->viscosity > 0.0f ? pairs->slice_length[slice] : 0;
+        Vf own_v[3], own_x[3], own_a[3][3], unused;
+        Vf sum[3] = {vf_zero(), vf_zero(), vf_zero()}, calm_sum[3] = {vf_zero(), vf_zero(), vf_zero()};
+        vf_load4(job->velocity + first, &own_v[0], &own_v[1], &own_v[2], &unused);
+        vf_load4(pairs->position + first, &own_x[0], &own_x[1], &own_x[2], &unused);
+        for (int c = 0; calm && c < 3; c++)
+            vf_load4(job->gradient[c] + first, &own_a[c][0], &own_a[c][1], &own_a[c][2], &unused);
+        const uint32_t length = job->viscosity > 0.0f || calm ? pairs->slice_length[slice] : 0;
         for (uint32_t entry = begin; entry < begin + length; entry++) {
             __builtin_prefetch(pairs->weights + (size_t)(entry + PREFETCH_ENTRIES) * SLICE);
             prefetch_entry(pairs->entries, entry + PREFETCH_ENTRIES, pairs->wide);
-            gather_neighbours(job->velocity + first, pairs->entries, entry, pairs->wide, &x, &y, &z, &w);
-            const Vf weight = vf_load_i16(pairs->weights + (size_t)entry * SLICE);
-            sx = vf_fma(weight, vf_sub(vx, x), sx);
-            sy = vf_fma(weight, vf_sub(vy, y), sy);
-            sz = vf_fma(weight, vf_sub(vz, z), sz);
+            Vf e[3];
+            gather_neighbours(job->velocity + first, pairs->entries, entry, pairs->wide, &e[0], &e[1], &e[2],
+                              &unused);
+            const Vf weight = vf_load_weight(pairs, entry);
+            for (int k = 0; k < 3; k++) {
+                e[k] = vf_sub(own_v[k], e[k]);
+                sum[k] = vf_fma(weight, e[k], sum[k]);
+            }
+            if (calm)
+                calm_pair(job, entry, first, own_x, own_a, weight, e, calm_sum);
         }
-        vf_store4(job->result + first, vf_fma(share, sx, vf_add(vx, vf_set(job->gravity_dt[0]))),
-                  vf_fma(share, sy, vf_add(vy, vf_set(job->gravity_dt[1]))),
-                  vf_fma(share, sz, vf_add(vz, vf_set(job->gravity_dt[2]))), vf_zero());
+        for (int k = 0; k < 3; k++) {
+            sum[k] = vf_fma(viscous, sum[k], vf_add(own_v[k], vf_set(job->gravity_dt[k])));
+            sum[k] = calm ? vf_fma(calming, calm_sum[k], sum[k]) : sum[k];
+        }
+        vf_store4(job->result + first, sum[0], sum[1], sum[2], vf_zero());
     }
+}
+
+static void forces(const ForceJob *job, uint32_t block) {
+    if (job->calming > 0.0f)
+        forces_slices(job, block, true);
+    else
+        forces_slices(job, block, false);
 }
 
 const Passes PASSES_JOIN(passes_, PASSES_ISA) = {
@@ -466,5 +582,6 @@ const Passes PASSES_JOIN(passes_, PASSES_ISA) = {
     .boundary = boundary,
     .accelerate = accelerate,
     .divergence = divergence,
+    .strain = strain,
     .forces = forces,
 };

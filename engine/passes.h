@@ -157,7 +157,16 @@ typedef struct ForceJob {
     Float4 *result;         /* out: velocity + gravity_dt - viscosity sum_j V W_ij (v_i - v_j) */
     float gravity_dt[3];
     float viscosity;
+    float calming;       /* share of the velocity that is no part of a linear field taken away; 0: none */
+    float calming_limit; /* m/s: at most this of the difference between two particles */
+    const Float4 *gradient[3]; /* calming: A_i h, column by column, from `strain` */
 } ForceJob;
+
+typedef struct StrainJob {
+    const PairData *pairs;
+    const Float4 *velocity;
+    Float4 *gradient[3]; /* out: columns of A_i h, m/s: the linear field v + A (x - x_i) that fits best */
+} StrainJob;
 
 typedef struct Passes {
     const char *name;
@@ -173,7 +182,9 @@ typedef struct Passes {
     /* result_i = (D v)_i = v_i . G_i - sum_j v_j . V grad W_ij; contacts with moving bodies are the caller's
      */
     void (*divergence)(const PairData *pairs, const Float4 *v, float *result, uint32_t block);
-    /* gravity, and XSPH viscosity that conserves momentum exactly */
+    /* velocity gradients by weighted least squares over the neighbours */
+    void (*strain)(const StrainJob *job, uint32_t block);
+    /* gravity, XSPH viscosity and calming, which conserve momentum exactly */
     void (*forces)(const ForceJob *job, uint32_t block);
 } Passes;
 

@@ -1,4 +1,5 @@
 /* Timed phases of a step, in the order they run. PHASE(id, key, label). Keys name columns of steps.csv and of summary.json. */
+PHASE(CONTROLS, "controls", "propulsion and steering")
 PHASE(EMIT, "emit", "blocks of fluid emitted")
 PHASE(BODIES, "bodies", "body samples moved and sorted")
 PHASE(SORT, "sort", "cells and stable sort")

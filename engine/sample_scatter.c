@@ -7,6 +7,8 @@
  * Each leaf gives its area to the nearest point. */
 #include "sample_parts.h"
 
+#include "base/random.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -135,14 +137,6 @@ typedef struct Place {
     uint32_t index;
 } Place;
 
-/* splitmix64 [Steele et al. 2014] of a counter. */
-static uint64_t random_bits(uint64_t counter) {
-    uint64_t z = (counter + 1) * 0x9e3779b97f4a7c15u;
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return z ^ (z >> 31);
-}
-
 static bool add_candidate(Candidates *candidates, const Leaf *leaf, uint64_t bits, Err *err) {
     if (candidates->count == candidates->capacity) {
         size_t capacity = 2 * (size_t)candidates->capacity + 4096;
@@ -172,9 +166,9 @@ static bool add_candidate(Candidates *candidates, const Leaf *leaf, uint64_t bit
 static bool collect(Sampler *sampler, const Leaf *leaf, void *user, Err *err) {
     Candidates *candidates = user;
     double share = candidate_density * leaf->area / (sampler->spacing * sampler->spacing);
-    share += (double)(random_bits(2 * candidates->leaf_count++) >> 11) * 0x1p-53;
+    share += random_share(0, 2 * candidates->leaf_count++);
     for (int left = (int)share; left > 0; left--)
-        if (!add_candidate(candidates, leaf, random_bits(2 * (uint64_t)candidates->count + 1), err))
+        if (!add_candidate(candidates, leaf, random_bits(0, 2 * (uint64_t)candidates->count + 1), err))
             return false;
     return true;
 }
@@ -187,7 +181,7 @@ static bool throw_darts(Sampler *sampler, Err *err) {
     for (uint32_t i = 0; i < candidates.count && ok; i++) {
         uint32_t left = SHUFFLE_BLOCK - i % SHUFFLE_BLOCK;
         left = left < candidates.count - i ? left : candidates.count - i;
-        uint32_t other = i + (uint32_t)((random_bits(~(uint64_t)i) >> 32) * left >> 32);
+        uint32_t other = i + (uint32_t)((random_bits(0, ~(uint64_t)i) >> 32) * left >> 32);
         Candidate taken = candidates.items[other];
         double position[3];
         candidates.items[other] = candidates.items[i];

@@ -492,6 +492,15 @@ bool geometry_make(const SkiffGeometryDef *def, const char *path, Mesh *mesh, Er
     return true;
 }
 
+void geometry_turn(const SkiffGeometryDef *def, const float place[3], double result[3]) {
+    float quaternion[4], turned[1][3] = {{place[0], place[1], place[2]}};
+    Mesh point = {.vertices = turned, .vertex_count = 1};
+    rotation_quaternion(def, quaternion);
+    mesh_transform(&point, def->scale, quaternion, (const float[3]){0, 0, 0});
+    for (int k = 0; k < 3; k++)
+        result[k] = (double)turned[0][k];
+}
+
 /* Own axes by turning the unit vectors as meshes are turned: one rule for both. */
 static void place_axes(const SkiffGeometryDef *def, Shape *shape) {
     float quaternion[4];

@@ -38,6 +38,8 @@ void shape_free(Shape *shape);
 /* The mesh of a geometry in its own rotation and scale, without the translation (which is double precision's
  * business). Checked: closed, outside out. */
 bool geometry_make(const SkiffGeometryDef *def, const char *path, Mesh *mesh, Err *err);
+/* Where the same scale and rotation bring a point or a direction of the geometry's own frame. */
+void geometry_turn(const SkiffGeometryDef *def, const float place[3], double result[3]);
 
 /* Signed distance in m, negative inside; exact (Euclidean) inside and outside. Closed forms hold while the
  * scale keeps the kind: any scale of a box, the same one in x and z for cylinders, stars and cones, a uniform

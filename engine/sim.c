@@ -95,8 +95,12 @@ static bool check_blocks(const SkiffDef *def, double *particles, Err *err) {
         if (block->repeat > 1 && !(block->period > 0.0 && isfinite(block->period)))
             good = err_add(err, ERR_INPUT, "FluidBlocks[%d].period: %g s, must be above 0", b, block->period);
         double counts[3];
+        /* water at rest is as dense as its particles' volume says, a lattice is thinner */
+        const double density =
+            block->fill == SKIFF_FILL_REST ? 1.01 / (double)def->params.volume_factor : 1.0;
         if (good)
-            *particles += block->repeat * block_particles(block, 2.0f * def->params.particle_radius, counts);
+            *particles +=
+                density * block->repeat * block_particles(block, 2.0f * def->params.particle_radius, counts);
     }
     return good;
 }
@@ -317,15 +321,21 @@ static uint64_t hash_def(const SkiffSim *sim, const SkiffDef *def) {
         XXH3_64bits_update(&state, &sim->bodies[b].release_time, sizeof(double));
     }
     for (int b = 0; b < def->block_count; b++) {
-        XXH3_64bits_update(&state, def->blocks[b].start, 9 * sizeof(float));
+        XXH3_64bits_update(&state, def->blocks[b].start, 6 * sizeof(float));
+        XXH3_64bits_update(&state, &def->blocks[b].fill, sizeof def->blocks[b].fill);
+        XXH3_64bits_update(&state, def->blocks[b].offset, 6 * sizeof(float)); /* and the velocity */
         XXH3_64bits_update(&state, &def->blocks[b].time, 2 * sizeof(double));
         XXH3_64bits_update(&state, &def->blocks[b].repeat, sizeof(int));
+    }
+    for (int d = 0; d < sim->drive_count; d++) { /* all its fields have four bytes: there is no padding */
+        XXH3_64bits_update(&state, &sim->drives[d].body, sizeof(int));
+        XXH3_64bits_update(&state, &sim->drives[d].def, sizeof(SkiffDriveDef));
     }
     XXH3_64bits_update(&state, &sim->domain, sizeof sim->domain);
     return XXH3_64bits_digest(&state);
 }
 
-static bool reserve_step_memory(SkiffSim *sim, uint32_t capacity, Err *err) {
+bool sim_reserve(SkiffSim *sim, uint32_t capacity, Err *err) {
     const size_t padded = capacity + BLOCK;
     return particles_reserve(&sim->particles, capacity, err) &&
            boundary_reserve(&sim->boundary, capacity, sim->body_count, err) &&
@@ -359,12 +369,12 @@ static bool build(SkiffSim *sim, const SkiffDef *def, Err *err) {
     good = make_tank(sim, def, err);
     for (sim->body_count = 0; sim->body_count < def->body_count; sim->body_count++)
         good = make_body(sim, def, sim->body_count, err) && good;
-    good = good && check_overlaps(sim, err) && choose_domain(sim, def, err) &&
+    good = good && drives_make(sim, def, err) && check_overlaps(sim, err) && choose_domain(sim, def, err) &&
            boundary_weigh(&sim->boundary.fixed, &sim->kernel, err) &&
-           reserve_step_memory(sim, (uint32_t)particles, err) &&
+           sim_reserve(sim, (uint32_t)particles, err) &&
            boundary_place(&sim->boundary, sim->bodies, sim->body_count, sim->origin, sim->kernel.support,
                           sim->threads, err) &&
-           block_emit(sim, &sim->stats.emitted, err) && probes_make(sim, def, err);
+           block_emit(sim, &sim->stats.particles_in[SKIFF_IN_EMITTED], err) && probes_make(sim, def, err);
     if (!good)
         return false;
     sim->def_hash = hash_def(sim, def);
@@ -397,6 +407,7 @@ void skiff_destroy(SkiffSim *sim) {
     for (int b = 0; b < sim->body_count; b++)
         body_free(&sim->bodies[b]);
     free(sim->bodies);
+    free(sim->drives);
     free(sim->blocks);
     shape_free(&sim->tank);
     particles_free(&sim->particles);
@@ -407,5 +418,7 @@ void skiff_destroy(SkiffSim *sim) {
     buffer_free(&sim->pressure);
     buffer_free(&sim->object_forces);
     buffer_free(&sim->sums);
+    tile_free(&sim->tile);
+    rest_cloud_free(&sim->rest);
     free(sim);
 }

@@ -2,7 +2,8 @@
 #ifndef SKIFF_SIM_H
 #define SKIFF_SIM_H
 
-#include "dfsph.h"
+#include "drive.h"
+#include "rest.h"
 #include "shape.h"
 
 typedef struct EmitBlock {
@@ -38,6 +39,8 @@ struct SkiffSim {
     bool tank_open;
     Body *bodies;
     int body_count;
+    Drive *drives;
+    int drive_count;
     Probe *probes;
     int probe_count;
     uint32_t probe_channels;
@@ -58,8 +61,13 @@ struct SkiffSim {
     Buffer object_forces; /* [objects][6] force (N) and torque about the object's centre (N m) of the last
                              step */
 
+    /* filling */
+    RestTile tile; /* loaded with the first fill */
+    RestCloud rest;
+    SkiffFill fill;
+
     /* advance */
-    Buffer sums; /* [blocks] partial sums of the statistics */
+    Buffer sums; /* [blocks] partial sums: of the statistics, of the water at a propeller */
     SkiffStats stats;
 };
 
@@ -70,11 +78,21 @@ bool block_emit(SkiffSim *sim, uint32_t *emitted, Err *err);
  * input). */
 double block_particles(const SkiffBlockDef *def, float spacing, double counts[3]);
 
-/* Gravity, viscosity and wall friction of one step, for fluid and bodies. */
-void forces_apply(SkiffSim *sim);
+/* Gravity, viscosity, calming and wall friction of one step, for fluid and bodies. */
+void forces_apply(SkiffSim *sim, const DfsphProblem *problem);
+/* The fluid's part, but for friction. Uses the solver's vectors between its solves. */
+void forces_apply_fluid(const DfsphProblem *problem, Dfsph *dfsph);
+
+/* Drives of the bodies, which stand at their start. */
+bool drives_make(SkiffSim *sim, const SkiffDef *def, Err *err);
+/* Thrust, steering and extra drag of one step, added to what pushes the bodies. */
+void drives_apply(SkiffSim *sim);
 
 bool probes_make(SkiffSim *sim, const SkiffDef *def, Err *err);
 void probes_free(SkiffSim *sim);
+
+/* Room for `capacity` particles in everything a step uses; what is there stays. */
+bool sim_reserve(SkiffSim *sim, uint32_t capacity, Err *err);
 
 double timer_ms(void);
 

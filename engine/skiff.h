@@ -24,28 +24,40 @@
 extern "C" {
 #endif
 
-/* ---- Settings (params.inl is the one list of them) ---- */
+/* ---- Settings (params.inl and drive.inl are the one list of them) ---- */
 
-typedef struct SkiffParams {
 #define PARAM_FLOAT(field, key, value, min, max, unit, help)  float field;
 #define PARAM_INT(field, key, value, min, max, unit, help)    int field;
 #define PARAM_BOOL(field, key, value, help)                   bool field;
 #define PARAM_VEC3(field, key, x, y, z, min, max, unit, help) float field[3];
 #define PARAM_ENUM(field, key, value, names, help)            int field;
+
+typedef struct SkiffParams {
 #include "params.inl"
+} SkiffParams;
+
+/* What drives and steers a body. */
+typedef struct SkiffDriveDef {
+#include "drive.inl"
+} SkiffDriveDef;
+
 #undef PARAM_FLOAT
 #undef PARAM_INT
 #undef PARAM_BOOL
 #undef PARAM_VEC3
 #undef PARAM_ENUM
-} SkiffParams;
+
+/* Values of the enums of drive.inl, in the order of their names. */
+enum { SKIFF_THRUST_AT_CENTRE, SKIFF_THRUST_AT_PROPELLER };
+enum { SKIFF_STEERING_TORQUE, SKIFF_STEERING_RUDDER };
+enum { SKIFF_HOLD_PROPORTIONAL, SKIFF_HOLD_BANGBANG };
 
 typedef enum SkiffParamType { SKIFF_FLOAT, SKIFF_INT, SKIFF_BOOL, SKIFF_VEC3, SKIFF_ENUM } SkiffParamType;
 
 typedef struct SkiffParamInfo {
     const char *key; /* JSON key */
     SkiffParamType type;
-    uint32_t offset;    /* of the field in SkiffParams */
+    uint32_t offset;    /* of the field in its struct */
     double defaults[3]; /* [0] for scalars; enums: index */
     double min, max;    /* inclusive; per component for vectors */
     const char *unit;   /* "" where there is none */
@@ -53,7 +65,8 @@ typedef struct SkiffParamInfo {
     const char *help;
 } SkiffParamInfo;
 
-const SkiffParamInfo *skiff_param_infos(int *count);
+const SkiffParamInfo *skiff_param_infos(int *count); /* of SkiffParams */
+const SkiffParamInfo *skiff_drive_infos(int *count); /* of SkiffDriveDef */
 /* Every field in its range and finite; one line of message for each that is not. */
 bool skiff_params_check(const SkiffParams *params, Err *err);
 
@@ -99,14 +112,22 @@ typedef struct SkiffTankDef {
     float wet_height;          /* only walls below this y are sampled, m; INFINITY: all */
 } SkiffTankDef;
 
-/* An axis-aligned block on a cubic lattice of spacing d: round((end - start) / d) particles along each axis,
- * at least one. */
+typedef enum SkiffFillKind {
+    SKIFF_FILL_LATTICE, /* a cubic lattice of spacing d: round((end - start) / d) particles along each axis,
+                           at least one; all of it must be inside the tank and free of water */
+    SKIFF_FILL_REST /* water at rest [Carensac2023 sec. 3]: as much as walls, bodies and water that is there
+                       already leave room for; its surface is the top of the block */
+} SkiffFillKind;
+
+/* An axis-aligned block of water. */
 typedef struct SkiffBlockDef {
     float start[3], end[3]; /* m */
-    float velocity[3];      /* m/s */
-    double time;            /* s, when it is emitted; <= 0: at the start */
-    double period;          /* s between repetitions */
-    int repeat;             /* how many times in all, >= 1 */
+    SkiffFillKind fill;
+    float offset[3];   /* rest: shifts the pattern of the points, m */
+    float velocity[3]; /* m/s */
+    double time;       /* s, when it is emitted; <= 0: at the start */
+    double period;     /* s between repetitions */
+    int repeat;        /* how many times in all, >= 1 */
 } SkiffBlockDef;
 
 /* Bits of SkiffBodyDef.free_axes: translation along and rotation about the world's axes. */
@@ -130,6 +151,7 @@ typedef struct SkiffBodyDef {
     float angular_velocity[3]; /* rad/s, world axes */
     uint32_t free_axes;        /* 0: static or prescribed */
     double release_time; /* s; until then the body is held still in every axis that is free afterwards */
+    const SkiffDriveDef *drive; /* NULL: none */
 } SkiffBodyDef;
 
 typedef enum SkiffProbeKind {
@@ -172,6 +194,7 @@ SkiffDef skiff_def_default(void);
 SkiffGeometryDef skiff_geometry_default(void);
 SkiffBlockDef skiff_block_default(void);
 SkiffBodyDef skiff_body_default(void);
+SkiffDriveDef skiff_drive_default(void);
 SkiffProbeDef skiff_probe_default(void);
 
 /* ---- Life ---- */
@@ -187,6 +210,10 @@ void skiff_destroy(SkiffSim *sim);
 /* One step of params.time_step. ERR_DIVERGED (step, particle, value in the message): the state is the one in
  * which the fault was found. */
 bool skiff_step(SkiffSim *sim, Err *err);
+
+/* Takes away the fluid particles inside [min, max) (m, world); the others stay as they are. ERR_INPUT: no
+ * memory, and nothing is removed. */
+bool skiff_remove_box(SkiffSim *sim, const double min[3], const double max[3], uint32_t *removed, Err *err);
 
 /* ---- Looking ---- */
 
@@ -250,6 +277,34 @@ const char *skiff_body_material_name(const SkiffSim *sim, int index, int materia
 /* The surface of the tank, window-local; no triangles where there is none. Owned by the simulation. */
 void skiff_tank_mesh(const SkiffSim *sim, const float (**vertices)[3], uint32_t *vertex_count,
                      const uint32_t (**triangles)[3], uint32_t *triangle_count);
+/* ---- Driving. Drives are numbered in the order of their bodies. ---- */
+
+/* What the helmsman does. All zero: nothing. */
+typedef struct SkiffControls {
+    double throttle; /* -1 (astern) to 1 */
+    double rudder;   /* -1 (to port) to 1 (to starboard); not looked at while a heading is held */
+    bool hold;       /* steer for `heading` */
+    double heading;  /* rad, to starboard of the direction that the drive's axis had at the start; any turn */
+} SkiffControls;
+
+typedef struct SkiffDrive {
+    int body;
+    SkiffControls controls;
+    double heading; /* rad, -pi to pi, as in SkiffControls; of the axis, seen from above */
+    double speed;   /* m/s, horizontal, along the heading */
+    /* applied in the last step; 0 before the drive's start time and while the body is held */
+    double thrust; /* N, negative astern */
+    double water;  /* 0 to 1: how much of its thrust the water gives a propeller; 1 at the centre of mass */
+    double rudder; /* -1 to 1, the heading hold's while one is held */
+    double torque; /* N m of the steering about the vertical through the centre of mass, to starboard */
+} SkiffDrive;
+
+int skiff_drive_count(const SkiffSim *sim);
+SkiffDrive skiff_drive(const SkiffSim *sim, int drive);
+/* For all steps from now on. Part of the state. ERR_USAGE when a value is out of range. */
+bool skiff_drive_set(SkiffSim *sim, int drive, const SkiffControls *controls, Err *err);
+
+/* ---- What a step came to ---- */
 
 enum {
 #define PHASE(id, key, label) SKIFF_PHASE_##id,
@@ -260,11 +315,34 @@ enum {
 const char *skiff_phase_key(int phase);
 const char *skiff_phase_label(int phase);
 
+/* Why particles appear (SKIFF_IN_...) and disappear (SKIFF_OUT_...): causes.inl. */
+enum {
+#define CAUSE_IN(id, key, label) SKIFF_IN_##id,
+#define CAUSE_OUT(id, key, label)
+#include "causes.inl"
+#undef CAUSE_IN
+#undef CAUSE_OUT
+    SKIFF_IN_COUNT
+};
+enum {
+#define CAUSE_IN(id, key, label)
+#define CAUSE_OUT(id, key, label) SKIFF_OUT_##id,
+#include "causes.inl"
+#undef CAUSE_IN
+#undef CAUSE_OUT
+    SKIFF_OUT_COUNT
+};
+const char *skiff_in_key(int cause);
+const char *skiff_in_label(int cause);
+const char *skiff_out_key(int cause);
+const char *skiff_out_label(int cause);
+
 typedef struct SkiffStats {
     uint64_t step;
     double time, dt; /* s, at the end of the step */
     uint32_t particles, boundary_samples, contacts;
-    uint32_t emitted, removed; /* during the step */
+    uint32_t particles_in[SKIFF_IN_COUNT], particles_out[SKIFF_OUT_COUNT]; /* during the step, by cause */
+    bool moved; /* the window moved in this step; never so far: there is no window yet */
     int density_iterations, divergence_iterations;
     double density_error_percent; /* mean over all particles of max(0, rho/rho0 - 1), found at the start of
                                      the step: what the last one left */
@@ -281,6 +359,26 @@ typedef struct SkiffStats {
     double step_ms;
 } SkiffStats;
 const SkiffStats *skiff_stats(const SkiffSim *sim);
+
+/* What filling with water at rest did: counts, densities and times of [Carensac2023 table 1]. Densities are
+ * relative to rest density, over the candidates (points that feel a solid or existing water). */
+typedef struct SkiffFill {
+    uint32_t particles;    /* new */
+    uint32_t candidates;   /* before the selection */
+    uint32_t selected;     /* left of them */
+    uint32_t active;       /* particles that are stabilised */
+    uint32_t rim;          /* particles beside them that stand still meanwhile */
+    int passes;            /* of the selection, the first and the last that only look included */
+    int steps;             /* of the stabilisation */
+    double density_mean;   /* after the selection, with the air still there */
+    double density_spread; /* standard deviation about the mean */
+    double density_rms;    /* root of the mean squared distance from the target */
+    double mean_speed,
+        max_speed; /* m/s, of the active in the last step of the stabilisation, before damping */
+    double load_ms, select_ms, settle_ms;
+} SkiffFill;
+/* The last fill; all zero when there was none. */
+const SkiffFill *skiff_fill(const SkiffSim *sim);
 
 /* Probe channels, in the order of the def: a height or pressure gives one value, a force six (fx fy fz tx ty
  * tz). */

@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { STATE_VERSION = 1, BODY_SCALARS = 3 + 4 + 3 + 3 };
+enum { STATE_VERSION = 2, BODY_SCALARS = 3 + 4 + 3 + 3 };
 
 static void body_to_scalars(const Body *body, double *out) {
     memcpy(out, body->position, 3 * sizeof(double));
@@ -30,19 +30,23 @@ static void add_field(StateField *fields, uint32_t *count, const char *name, Sta
 
 bool skiff_save(const SkiffSim *sim, const char *path, Err *err) {
     double *bodies = malloc(((size_t)sim->body_count * BODY_SCALARS + 1) * sizeof *bodies);
+    double *drives = malloc(((size_t)sim->drive_count * DRIVE_SCALARS + 1) * sizeof *drives);
     int32_t *emitted = malloc(((size_t)sim->block_count + 1) * sizeof *emitted);
-    if (bodies == NULL || emitted == NULL) {
+    if (bodies == NULL || drives == NULL || emitted == NULL) {
         free(bodies);
+        free(drives);
         free(emitted);
         return err_set(err, ERR_IO, "%s: no memory to save the state", path);
     }
     for (int b = 0; b < sim->body_count; b++)
         body_to_scalars(&sim->bodies[b], bodies + b * BODY_SCALARS);
+    for (int d = 0; d < sim->drive_count; d++)
+        drive_to_scalars(&sim->drives[d], drives + d * DRIVE_SCALARS);
     for (int b = 0; b < sim->block_count; b++)
         emitted[b] = sim->blocks[b].done;
     const uint64_t header[3] = {sim->def_hash, sim->step, sim->particles.next_id};
     const double place[4] = {sim->time, sim->origin[0], sim->origin[1], sim->origin[2]};
-    StateField fields[PARTICLE_FIELD_COUNT + 4];
+    StateField fields[PARTICLE_FIELD_COUNT + 5];
     uint32_t count = 0;
     add_field(fields, &count, "header", STATE_U64, 1, 3, header);
     add_field(fields, &count, "time_and_origin", STATE_F64, 1, 4, place);
@@ -50,9 +54,11 @@ bool skiff_save(const SkiffSim *sim, const char *path, Err *err) {
         add_field(fields, &count, particle_fields[f].name, particle_fields[f].type,
                   particle_fields[f].components, sim->particles.count, sim->particles.front[f].data);
     add_field(fields, &count, "bodies", STATE_F64, BODY_SCALARS, (uint64_t)sim->body_count, bodies);
+    add_field(fields, &count, "drives", STATE_F64, DRIVE_SCALARS, (uint64_t)sim->drive_count, drives);
     add_field(fields, &count, "blocks_emitted", STATE_I32, 1, (uint64_t)sim->block_count, emitted);
     const bool good = state_file_write(path, STATE_VERSION, fields, count, err);
     free(bodies);
+    free(drives);
     free(emitted);
     return good;
 }
@@ -63,10 +69,12 @@ static bool load_fields(SkiffSim *sim, const StateFile *file, const char *path, 
     const StateField *place = state_file_field(file, "time_and_origin", STATE_F64, 1, 4, err);
     const StateField *bodies =
         state_file_field(file, "bodies", STATE_F64, BODY_SCALARS, (uint64_t)sim->body_count, err);
+    const StateField *drives =
+        state_file_field(file, "drives", STATE_F64, DRIVE_SCALARS, (uint64_t)sim->drive_count, err);
     const StateField *emitted =
         state_file_field(file, "blocks_emitted", STATE_I32, 1, (uint64_t)sim->block_count, err);
     const StateField *position = state_file_field(file, "position", STATE_F32, 4, UINT64_MAX, err);
-    if (!header || !place || !bodies || !emitted || !position)
+    if (!header || !place || !bodies || !drives || !emitted || !position)
         return false;
     const uint64_t *numbers = header->data;
     if (numbers[0] != sim->def_hash)
@@ -81,6 +89,11 @@ static bool load_fields(SkiffSim *sim, const StateFile *file, const char *path, 
                                      particle_fields[f].components, position->count, err);
         if (fields[f] == NULL)
             return false;
+    }
+    for (int d = 0; d < sim->drive_count; d++) {
+        Err reason = {0};
+        if (!drive_check_scalars((const double *)drives->data + d * DRIVE_SCALARS, &reason))
+            return err_set(err, ERR_INPUT, "%s: drives[%d]: %s", path, d, reason.message);
     }
     Particles *particles = &sim->particles;
     particles->count = (uint32_t)position->count;
@@ -97,6 +110,8 @@ static bool load_fields(SkiffSim *sim, const StateFile *file, const char *path, 
     memcpy(sim->origin, numbers_place + 1, sizeof sim->origin);
     for (int b = 0; b < sim->body_count; b++)
         body_from_scalars(&sim->bodies[b], (const double *)bodies->data + b * BODY_SCALARS);
+    for (int d = 0; d < sim->drive_count; d++)
+        drive_from_scalars(&sim->drives[d], (const double *)drives->data + d * DRIVE_SCALARS);
     for (int b = 0; b < sim->block_count; b++)
         sim->blocks[b].done = ((const int32_t *)emitted->data)[b];
     return true;

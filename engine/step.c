@@ -1,8 +1,8 @@
 /* ONE STEP, TOP TO BOTTOM. Read this first.
  *
  * [Carensac2023 alg. 2], with the pressure solves of dfsph.c:
- *   emit blocks -> move body samples -> sort -> search -> boundary terms -> divergence solve -> gravity and
- * viscosity -> density solve -> advance. */
+ *   thrust and steering -> emit blocks -> move body samples -> sort -> search -> boundary terms -> divergence
+ * solve -> gravity and viscosity -> density solve -> advance. */
 #define _POSIX_C_SOURCE 200809L
 #include "sim.h"
 
@@ -44,9 +44,8 @@ static bool place_bodies(SkiffSim *sim, Err *err) {
 
 static bool sort_particles(SkiffSim *sim, Err *err) {
     const bool remove = sim->params.escape == 1;
-    sim->stats.removed = 0;
     return grid_sort(&sim->grid, &sim->particles, sim->kernel.support, &sim->domain,
-                     remove ? &sim->stats.removed : NULL, sim->threads, err);
+                     remove ? &sim->stats.particles_out[SKIFF_OUT_ESCAPED] : NULL, sim->threads, err);
 }
 
 static RowsJob rows_job(SkiffSim *sim) {
@@ -73,6 +72,11 @@ static void solve_divergence(SkiffSim *sim) {
     const SolveResult result = dfsph_solve(&sim->dfsph, &problem, SOLVE_DIVERGENCE);
     sim->stats.divergence_iterations = result.iterations;
     sim->stats.divergence_error_percent = 100.0 * result.error;
+}
+
+static void apply_forces(SkiffSim *sim) {
+    const DfsphProblem problem = step_problem(sim);
+    forces_apply(sim, &problem);
 }
 
 static void solve_density(SkiffSim *sim) {
@@ -211,6 +215,12 @@ static bool check(SkiffSim *sim, Err *err) {
     return (fine || report_fault(sim, err)) && check_bodies(sim, err);
 }
 
+static void begin_stats(SkiffStats *stats) {
+    memset(stats->particles_in, 0, sizeof stats->particles_in);
+    memset(stats->particles_out, 0, sizeof stats->particles_out);
+    stats->moved = false;
+}
+
 /* Runs one phase, which sets `good`, and notes its time; after a failure the rest is skipped. */
 #define PHASE_RUN(id, call)                                                                                  \
     if (good) {                                                                                              \
@@ -224,13 +234,15 @@ bool skiff_step(SkiffSim *sim, Err *err) {
     double before = timer_ms();
     const double begin = before;
     bool good = true;
-    PHASE_RUN(EMIT, good = block_emit(sim, &sim->stats.emitted, err));
+    begin_stats(&sim->stats);
+    PHASE_RUN(CONTROLS, drives_apply(sim));
+    PHASE_RUN(EMIT, good = block_emit(sim, &sim->stats.particles_in[SKIFF_IN_EMITTED], err));
     PHASE_RUN(BODIES, good = place_bodies(sim, err));
     PHASE_RUN(SORT, good = sort_particles(sim, err));
     PHASE_RUN(SEARCH, good = find_neighbours(sim, err));
     PHASE_RUN(BOUNDARY, good = add_boundary(sim, err));
     PHASE_RUN(DIVERGENCE, solve_divergence(sim));
-    PHASE_RUN(FORCES, forces_apply(sim));
+    PHASE_RUN(FORCES, apply_forces(sim));
     PHASE_RUN(PRESSURE, solve_density(sim));
     PHASE_RUN(ADVANCE, measure_forces(sim); advance(sim); good = check(sim, err));
     sim->stats.step_ms = timer_ms() - begin;

@@ -13,6 +13,7 @@
  * Serial but for the sums over neighbours. */
 #include "tile.h"
 
+#include "base/random.h"
 #include "dvec.h"
 #include "tile_pairs.h"
 
@@ -48,14 +49,6 @@ SkiffTileDef skiff_tile_def_default(void) {
 }
 
 /* ---- Beginning ---- */
-
-/* splitmix64 [Steele et al. 2014] of a counter, from [0, 1). */
-static double random_share(uint64_t seed, uint64_t counter) {
-    uint64_t bits = seed * 0xd1342543de82ef95u + (counter + 1) * 0x9e3779b97f4a7c15u;
-    bits = (bits ^ bits >> 30) * 0xbf58476d1ce4e5b9u;
-    bits = (bits ^ bits >> 27) * 0x94d049bb133111ebu;
-    return (double)((bits ^ bits >> 31) >> 11) * 0x1p-53;
-}
 
 static bool check_def(const SkiffTileDef *def, Err *err) {
     /* Below 5 d a point would be its own neighbour's neighbour from both sides of the box. */

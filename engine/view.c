@@ -24,6 +24,10 @@ int skiff_threads(const SkiffSim *sim) {
     return sim->threads;
 }
 
+const SkiffFill *skiff_fill(const SkiffSim *sim) {
+    return &sim->fill;
+}
+
 const SkiffStats *skiff_stats(const SkiffSim *sim) {
     return &sim->stats;
 }
@@ -118,6 +122,11 @@ uint64_t skiff_hash(const SkiffSim *sim) {
         XXH3_64bits_update(&state, body->rotation, sizeof body->rotation);
         XXH3_64bits_update(&state, body->velocity, sizeof body->velocity);
         XXH3_64bits_update(&state, body->angular_velocity, sizeof body->angular_velocity);
+    }
+    for (int d = 0; d < sim->drive_count; d++) {
+        double scalars[DRIVE_SCALARS];
+        drive_to_scalars(&sim->drives[d], scalars);
+        XXH3_64bits_update(&state, scalars, sizeof scalars);
     }
     return XXH3_64bits_digest(&state);
 }

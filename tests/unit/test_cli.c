@@ -137,6 +137,8 @@ static void usage_mistakes_exit_with_2(void **state) {
         {"run", "skiff run: the scene is missing\nTry 'skiff run --help'.\n"},
         {"run a.json", "skiff run: -o DIR is missing: the folder for the results\n"},
         {"run a.json b.json", "skiff run: one scene at a time: \"a.json\" and \"b.json\" are given\n"},
+        {"profile", "skiff profile: the folder is missing\nTry 'skiff profile --help'.\n"},
+        {"profile a b", "skiff profile: one folder at a time: \"a\" and \"b\" are given\n"},
         {"run a.json --frce", "skiff run: unknown option --frce, did you mean --force?\n"},
         {"run a.json --check 3", "skiff run: unknown option --check, did you mean --checkpoint-every?\n"},
         {"run a.json -z", "skiff run: unknown option -z\n"},
@@ -159,6 +161,17 @@ static void usage_mistakes_exit_with_2(void **state) {
         {"run a.json -o out --resume", "skiff run: out: there is no such folder to resume\n"},
         {"bench a.json --steps 0",
          "skiff bench: --steps: expected an integer from 1 to 1e+06, found \"0\"\n"},
+        {"rest", "skiff rest: a command is missing\nTry 'skiff rest --help'.\n"},
+        {"rest mkae", "skiff rest: unknown command mkae, did you mean make?\nTry 'skiff rest --help'.\n"},
+        {"help rest mkae", "skiff rest: unknown command mkae, did you mean make?\n"},
+        {"rest make tile", "skiff rest make: takes options only, \"tile\" is given\n"},
+        {"rest make --edge 5", "skiff rest make: --edge: expected a number from 6 to 64, found \"5\"\n"},
+        {"rest cut -o block.skiff", "skiff rest cut: the folder is missing\n"},
+        {"rest cut out", "skiff rest cut: -o FILE is missing\n"},
+        {"rest cut out --min 1,2,x",
+         "skiff rest cut: --min: expected three numbers, X,Y,Z, found \"1,2,x\"\n"},
+        {"rest cut out --max 1,2,3,4",
+         "skiff rest cut: --max: expected three numbers, X,Y,Z, found \"1,2,3,4\"\n"},
         {"check " SMALL " --set viscosty=1",
          "skiff check: --set viscosty=1: no key \"viscosty\", did you mean viscosity?\n"},
     };
@@ -173,6 +186,9 @@ static void help_explains_every_command(void **state) {
     expect("-h", 0, "Exit codes: 0 ok, 2 usage, 3 bad input, 4 no OpenGL, 5 diverged", NULL);
     expect("help", 0, "skiff bench SCENE", NULL);
     expect("--version", 0, "commit ", NULL);
+    expect("rest --help", 0, "skiff rest cut DIR -o FILE", NULL);
+    expect("help rest", 0, "skiff rest show [FILE]", NULL);
+    expect("help rest make", 0, "Usage: skiff rest make [-o FILE] [OPTION]...", NULL);
     for (int i = 0; i < COUNT(commands); i++) {
         char arguments[64], usage[64];
         snprintf(usage, sizeof usage, "Usage: skiff %s SCENE", commands[i]);
@@ -187,7 +203,9 @@ static void help_explains_every_command(void **state) {
 
 static void help_lines_are_short(void **state) {
     (void)state;
-    static const char *const arguments[] = {"--help", "run --help", "check --help", "bench --help"};
+    static const char *const arguments[] = {"--help",          "run --help",      "check --help",
+                                            "bench --help",    "rest --help",     "rest make --help",
+                                            "rest cut --help", "rest show --help"};
     for (int i = 0; i < COUNT(arguments); i++) {
         Result result = finish(start(arguments[i]));
         for (const char *line = result.out; *line;) {
@@ -325,14 +343,16 @@ static void assert_same_end(const char *a, const char *b) {
     json_decref(x);
     json_decref(y);
     assert_same_steps(in(a, "steps.csv"), in(b, "steps.csv"));
+    assert_same_file(in(a, "ledger.csv"), in(b, "ledger.csv"));
     assert_same_file(in(a, "hull.csv"), in(b, "hull.csv"));
     assert_same_file(in(a, "probes.csv"), in(b, "probes.csv"));
 }
 
 static void a_run_writes_its_results(void **state) {
     (void)state;
-    static const char *const names[] = {"steps.csv",  "hull.csv",    "probes.csv", "summary.json",
-                                        "scene.json", "report.html", "state.skiff"};
+    static const char *const names[] = {"steps.csv",   "ledger.csv",   "hull.csv",
+                                        "probes.csv",  "summary.json", "scene.json",
+                                        "report.html", "state.skiff",  "trace.json"};
     expect("run " SMALL " -o done --duration 0.06", 0, NULL, "finished at t = 0.06 s, step 20");
     for (int i = 0; i < COUNT(names); i++)
         assert_true(exists(in("done", names[i])));
@@ -356,6 +376,9 @@ static void a_run_writes_its_results(void **state) {
     assert_int_equal(csv_column(&steps, "step"), 0);
     assert_true(csv_column(&steps, "step_ms") == steps.column_count - 1);
     csv_free(&steps);
+    expect("profile done", 0, "slowest steps", NULL);
+    expect("profile done --json", 0, "{\"steps\": 20, \"moves\": 0, \"mean_ms\": ", NULL);
+    expect("profile nowhere", ERR_INPUT, NULL, "nowhere/steps.csv: ");
 }
 
 static void an_existing_folder_is_refused(void **state) {
@@ -493,6 +516,86 @@ static void a_blow_up_exits_with_5(void **state) {
     json_decref(summary);
 }
 
+/* ---- Driving ---- */
+
+/* A raft in a small tank; `drive` may be empty. */
+static void write_raft(const char *path, const char *drive) {
+    char text[2048];
+    snprintf(
+        text, sizeof text,
+        "{\"version\": 1, \"input\": \"scene.input\", \"Configuration\": {\"duration\": 0.12},"
+        " \"Tank\": {\"type\": \"box\", \"min\": [-0.4, 0, -0.3], \"max\": [0.4, 0.6, 0.3], \"open\": true},"
+        " \"FluidBlocks\": [{\"start\": [-0.375, 0.025, -0.275], \"end\": [0.375, 0.175, 0.275]}],"
+        " \"RigidBodies\": [{\"name\": \"raft\", \"box\": [0.3, 0.1, 0.2], \"density\": 500,"
+        " \"translation\": [0, 0.2, 0], \"isDynamic\": true%s}]}",
+        drive);
+    write_text(path, text);
+    write_text("scene.input", "0.03 throttle 0.5\n");
+}
+
+static const char raft_drive[] = ", \"drive\": {\"thrust\": 10, \"steeringTorque\": 0.5}";
+static const char raft_input[] =
+    "0 press w\n0.02 heading 20\n0.05 press d\n0.08 release d\n0.1 heading -10\n";
+
+static void a_driven_run_replays_and_resumes(void **state) {
+    (void)state;
+    write_raft("raft.json", raft_drive);
+    write_text("raft.input", raft_input);
+    expect("run raft.json -o sailed -q --input raft.input --threads 1", 0, NULL, "");
+    char *text = read_text("sailed/run.input");
+    assert_non_null(strstr(text, " heading 20\n"));
+    assert_non_null(strstr(text, " rudder 1\n")); /* d is bound to it */
+    free(text);
+    assert_same_file("sailed/script.input", "raft.input");
+    /* what was driven, driven again */
+    expect("run raft.json -o replayed -q --input sailed/run.input --threads 2", 0, NULL, "");
+    assert_same_file("sailed/run.input", "replayed/run.input");
+    /* 40 steps are 20 and 20: the folder knows its input */
+    expect("run raft.json -o halves -q --input raft.input --duration 0.06", 0, NULL, "comes after the end");
+    write_text("raft.input", "");
+    expect("run raft.json -o halves -q --resume", 0, NULL, "");
+    static const char *const others[] = {"replayed", "halves"};
+    for (int i = 0; i < COUNT(others); i++) {
+        json_t *x = summary_of("sailed"), *y = summary_of(others[i]);
+        assert_string_equal(json_string_value(json_object_get(x, "state_hash")),
+                            json_string_value(json_object_get(y, "state_hash")));
+        json_decref(x);
+        json_decref(y);
+        assert_same_steps("sailed/steps.csv", in(others[i], "steps.csv"));
+        assert_same_file("sailed/hull.csv", in(others[i], "hull.csv"));
+    }
+    assert_same_file("sailed/run.input", "halves/run.input");
+    /* the scene's own input, and a raft without one, go elsewhere */
+    expect("run raft.json -o own -q", 0, NULL, "");
+    text = read_text("own/run.input");
+    assert_non_null(strstr(text, " throttle 0.5\n"));
+    free(text);
+}
+
+static void input_that_cannot_be_right_is_refused(void **state) {
+    (void)state;
+    write_raft("raft.json", raft_drive);
+    write_raft("drift.json", "");
+    write_text("raft.input", raft_input);
+    write_text("bad.input", "1 thottle 1\n0 rudder 3\n");
+    expect("run raft.json -o never --input bad.input", ERR_INPUT, NULL,
+           "bad.input:1: unknown command thottle, did you mean throttle?\n"
+           "bad.input:2: 0 s is before the line above, which is at 1 s\n"
+           "bad.input:2: rudder: expected");
+    expect("run raft.json -o never --input none.input", ERR_INPUT, NULL, "none.input: ");
+    assert_false(exists("never"));
+    expect("run drift.json -o never --input raft.input", ERR_INPUT, NULL,
+           "raft.input:1: no body of the scene has a drive");
+    /* the past cannot change, the future can */
+    expect("run raft.json -o past -q --input raft.input --duration 0.06", 0, NULL, "");
+    write_text("other.input", "0 press w\n0.02 heading 21\n");
+    expect("run raft.json -o past -q --resume --input other.input", ERR_INPUT, NULL,
+           "other.input: differs from past/script.input near line 2, before the checkpoint");
+    write_text("other.input", "0 press w\n0.02 heading 20\n0.05 press d\n0.07 throttle 0\n");
+    expect("run raft.json -o past -q --resume --input other.input", 0, NULL, "");
+    assert_same_file("past/script.input", "other.input");
+}
+
 /* ---- Benchmarks ---- */
 
 static void bench_prints_one_line_of_json(void **state) {
@@ -586,6 +689,48 @@ static void damaged_tables_are_refused(void **state) {
     }
 }
 
+/* ---- Water at rest ---- */
+
+static double figure_of(const char *arguments, const char *key) {
+    Result result = finish(start(arguments));
+    if (result.code != 0)
+        fail_msg("skiff %s: exit code %d\n%s", arguments, result.code, result.err);
+    assert_non_null(strchr(result.out, '\n'));
+    assert_string_equal(strchr(result.out, '\n'), "\n"); /* one line */
+    json_t *line = json_loads(result.out, 0, NULL);
+    assert_true(json_is_number(json_object_get(line, key)));
+    double value = json_number_value(json_object_get(line, key));
+    json_decref(line);
+    drop(&result);
+    return value;
+}
+
+static void rest_tiles_are_made_and_shown(void **state) {
+    (void)state;
+    expect("rest show", 0, "periodic tile of 2171 points", NULL);
+    assert_true(figure_of("rest make --edge 6 --seed 3 --threads 1 -o a.tile --json", "points") == 271);
+    double spread = figure_of("rest show a.tile --json", "density_sd_percent");
+    assert_true(spread > 0 && spread < 0.01);
+    expect("rest show nowhere.tile", ERR_INPUT, NULL, "nowhere.tile: ");
+    write_text("no.tile", "not a tile");
+    expect("rest show no.tile", ERR_INPUT, NULL, "no.tile: not a Skiff state file");
+}
+
+static void blocks_are_cut_from_runs(void **state) {
+    (void)state;
+    expect("rest cut nowhere -o b.block", ERR_INPUT, NULL, "nowhere: there is no such folder");
+    expect("run " SMALL " -o tank -q --duration 0.03", 0, NULL, NULL);
+    expect("rest cut tank -o b.block", ERR_INPUT, NULL,
+           "nothing to cut: the box that --min and --max give reaches");
+    expect("rest cut tank --min -0.2,0.1,-0.2 --max 0.2,0.25,0.2 -o b.block", ERR_INPUT, NULL,
+           "0.15 m long in y: it must be longer than two support radii, 0.2 m");
+    assert_false(exists("b.block"));
+    expect("rest cut tank --min -0.2,0.05,-0.2 --max 0.2,0.35,0.2 -o b.block", 0, "block of ", NULL);
+    assert_float_equal(figure_of("rest show b.block --json", "size_y"), 12, 1e-5);
+    expect("rest cut tank --min -0.2,0.3,-0.2 --max 0.2,0.1,0.2 -o c.block", ERR_INPUT, NULL,
+           "tank: nothing to cut: the box that --min and --max give reaches from 0.3 to 0.1 m in y");
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(usage_mistakes_exit_with_2),
@@ -602,10 +747,14 @@ int main(void) {
         cmocka_unit_test(a_resume_that_cannot_be_right_is_refused),
         cmocka_unit_test(signals_end_a_run_with_a_checkpoint),
         cmocka_unit_test(a_blow_up_exits_with_5),
+        cmocka_unit_test(a_driven_run_replays_and_resumes),
+        cmocka_unit_test(input_that_cannot_be_right_is_refused),
         cmocka_unit_test(bench_prints_one_line_of_json),
         cmocka_unit_test(bench_keeps_rows),
         cmocka_unit_test(a_full_disk_is_noticed),
         cmocka_unit_test(damaged_tables_are_refused),
+        cmocka_unit_test(rest_tiles_are_made_and_shown),
+        cmocka_unit_test(blocks_are_cut_from_runs),
     };
     return cmocka_run_group_tests_name("cli", tests, make_folder, remove_folder);
 }

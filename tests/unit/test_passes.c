@@ -238,6 +238,29 @@ static void test_crowd(void **state) {
     rows_free(&rows);
 }
 
+/* Around the cell of every point within the bounds lies the whole margin, also where the bounds are multiples
+ * of the cell size and rounding decides the cell. */
+static void test_margins(void **state) {
+    (void)state;
+    const float sizes[] = {0.1f, 0.4f, 0.2f, 0.05f, 0.3f};
+    for (size_t s = 0; s < sizeof sizes / sizeof sizes[0]; s++)
+        for (int n = -2000; n <= 2000; n++)
+            for (int margin = 1; margin <= 2; margin++) {
+                const float exact = (float)n * sizes[s];
+                const float points[] = {nextafterf(exact, -1e9f), exact, nextafterf(exact, 1e9f),
+                                        (float)(n * 0.1), (float)n * 0.025f};
+                for (size_t p = 0; p < sizeof points / sizeof points[0]; p++) {
+                    const float x = points[p], far = x + 7.0f * sizes[s];
+                    const GridBounds bounds = {{x, x, x}, {far, far, far}};
+                    CellGrid cells;
+                    assert_true(grid_layout(&cells, &bounds, sizes[s], margin));
+                    const int low = (int)floorf((x - cells.origin[0]) * cells.inv_size);
+                    const int high = (int)floorf((far - cells.origin[0]) * cells.inv_size);
+                    assert_true(low >= margin && high < cells.size[0] - margin);
+                }
+            }
+}
+
 /* The sort is stable and the same for every number of threads; particles outside go, or are named. */
 static void test_sort(void **state) {
     (void)state;
@@ -277,11 +300,9 @@ static void test_sort(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_against_all_pairs),
-        cmocka_unit_test(test_adjoint),
-        cmocka_unit_test(test_same_bits),
-        cmocka_unit_test(test_crowd),
-        cmocka_unit_test(test_sort),
+        cmocka_unit_test(test_against_all_pairs), cmocka_unit_test(test_adjoint),
+        cmocka_unit_test(test_same_bits),         cmocka_unit_test(test_crowd),
+        cmocka_unit_test(test_margins),           cmocka_unit_test(test_sort),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -51,10 +51,10 @@ static const struct {
     {"{\"version\": 1, \"Tnak\": {}}", "s.json: Tnak: unknown key, did you mean Tank?"},
     {"{\"version\": 1, \"Boats\": {}}",
      "s.json: Boats: unknown key, expected one of $schema, version, title, description, Configuration, Tank, "
-     "FluidBlocks, RigidBodies, Probes, Render"},
+     "FluidBlocks, RigidBodies, Probes, input, Keys, Render"},
     {"{\"version\": 1, \"\\u001b[31m\": 1}",
      "s.json: ?[31m: unknown key, expected one of $schema, version, title, description, Configuration, Tank, "
-     "FluidBlocks, RigidBodies, Probes, Render"},
+     "FluidBlocks, RigidBodies, Probes, input, Keys, Render"},
 };
 
 /* Bodies of a scene: `"version": 1` stands before them. */
@@ -175,6 +175,26 @@ static const struct {
      "s.json: RigidBodies[0].freeAxes: has no meaning while isDynamic is false"},
     {"\"RigidBodies\": [{\"name\": \"a\", \"sphere\": 1}, {\"name\": \"b\", \"sphere\": 1, \"densty\": 300}]",
      "s.json: RigidBodies[1].densty: unknown key, did you mean density?"},
+
+    {"\"RigidBodies\": [{\"name\": \"a\", \"sphere\": 1, \"drive\": true}]",
+     "s.json: RigidBodies[0].drive: expected an object or null, found true"},
+    {"\"RigidBodies\": [{\"name\": \"a\", \"sphere\": 1, \"drive\": {\"thurst\": 1}}]",
+     "s.json: RigidBodies[0].drive.thurst: unknown key, did you mean thrust?"},
+    {"\"RigidBodies\": [{\"name\": \"a\", \"sphere\": 1, \"drive\": {\"thrust\": -1, \"steering\": "
+     "\"ruder\"}}]",
+     "s.json: RigidBodies[0].drive.thrust: expected a number from 0 to 1e+09 N, found -1\n"
+     "s.json: RigidBodies[0].drive.steering: expected one of torque, rudder, found \"ruder\"; did you mean "
+     "rudder?"},
+
+    {"\"Keys\": [{\"key\": \"w\"}]",
+     "s.json: Keys[0].action: missing, expected one of throttle, rudder, camera: What it does: throttle and "
+     "rudder while it is held, camera when it is pressed"},
+    {"\"Keys\": [{\"key\": \"w\", \"action\": \"throttle\", \"value\": 2}]",
+     "s.json: Keys[0].value: expected a number from -1 to 1, found 2"},
+    {"\"Keys\": [{\"key\": \"w\", \"action\": \"throttle\", \"camera\": \"top\"}]",
+     "s.json: Keys[0].camera: has no meaning for action \"throttle\", only for \"camera\""},
+    {"\"Keys\": [{\"key\": \"w\", \"action\": \"throttle\"}, {\"key\": \"w\", \"action\": \"rudder\"}]",
+     "s.json: Keys[1]: key w is bound by Keys[0] already"},
 
     {"\"Probes\": [{\"name\": \"a\", \"type\": \"height\", \"point\": [0, 0, 0], \"radius\": 1}]",
      "s.json: Probes[0].radius: has no meaning for type \"height\", only for \"pressure\""},
@@ -454,6 +474,7 @@ static const struct {
     {"Tank.open=true", ERR_NONE, "Tank.open: true"},
     {"Tank=null", ERR_NONE, "Tank: null"},
     {"Probes=[]", ERR_NONE, "Probes: []"},
+    {"Keys=[]", ERR_NONE, "Keys: []"},
     {"viscosity=5", ERR_INPUT, "--set Configuration.viscosity: expected a number from 0 to 1, found 5"},
     {"viscosity=", ERR_INPUT, "--set Configuration.viscosity: expected a number from 0 to 1, found \"\""},
     {"RigidBodies[0].density=-3", ERR_INPUT,

@@ -150,7 +150,7 @@ static void test_escape(void **state) {
         bool good = true;
         while (good && skiff_time(sim) < 1.0) {
             good = skiff_step(sim, &err);
-            removed += skiff_stats(sim)->removed;
+            removed += skiff_stats(sim)->particles_out[SKIFF_OUT_ESCAPED];
             assert_true(!good || skiff_particles(sim).count + removed == start);
         }
         if (remove) {
@@ -277,6 +277,46 @@ static void test_carving(void **state) {
     skiff_destroy(sim);
 }
 
+/* What stays keeps its order and everything that belongs to it, and goes on. */
+static void test_remove_box(void **state) {
+    (void)state;
+    Scene scene;
+    scene_make(&scene);
+    SkiffSim *sim = accept(&scene);
+    Err err = {0};
+    for (int step = 0; step < 5; step++)
+        assert_true(skiff_step(sim, &err));
+    const SkiffParticles before = skiff_particles(sim);
+    uint64_t ids[2000];
+    float values[2000][3];
+    uint32_t kept = 0, removed;
+    assert_in_range(before.count, 100, 2000);
+    for (uint32_t i = 0; i < before.count; i++) {
+        const double x = (double)before.position[i][0] + before.origin[0];
+        const double y = (double)before.position[i][1] + before.origin[1];
+        if (x >= -0.1 && x < 0.1 && y < 0.15)
+            continue;
+        ids[kept] = before.id[i];
+        memcpy(values[kept++], (float[]){before.density[i], before.pressure[i], before.velocity[i][1]},
+               sizeof *values);
+    }
+    assert_true(skiff_remove_box(sim, (double[]){-0.1, -1, -1}, (double[]){0.1, 0.15, 1}, &removed, &err));
+    const SkiffParticles after = skiff_particles(sim);
+    assert_true(removed > 50);
+    assert_int_equal(removed, before.count - kept);
+    assert_int_equal(after.count, kept);
+    for (uint32_t i = 0; i < kept; i++) {
+        assert_int_equal(after.id[i], ids[i]);
+        assert_true(after.density[i] == values[i][0] && after.pressure[i] == values[i][1] &&
+                    after.velocity[i][1] == values[i][2]);
+    }
+    for (int step = 0; step < 5; step++)
+        assert_true(skiff_step(sim, &err));
+    assert_true(skiff_remove_box(sim, (double[]){5, 5, 5}, (double[]){6, 6, 6}, &removed, &err));
+    assert_int_equal(removed, 0);
+    skiff_destroy(sim);
+}
+
 /* Water sliding over a floor: free slip keeps its speed, friction takes it; a body takes up what the water
  * loses. */
 static void test_wall_friction(void **state) {
@@ -309,9 +349,11 @@ static void test_wall_friction(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_refusals), cmocka_unit_test(test_blow_up),       cmocka_unit_test(test_escape),
-        cmocka_unit_test(test_emit),     cmocka_unit_test(test_flat_wall),     cmocka_unit_test(test_states),
-        cmocka_unit_test(test_carving),  cmocka_unit_test(test_wall_friction),
+        cmocka_unit_test(test_refusals),      cmocka_unit_test(test_blow_up),
+        cmocka_unit_test(test_escape),        cmocka_unit_test(test_emit),
+        cmocka_unit_test(test_flat_wall),     cmocka_unit_test(test_states),
+        cmocka_unit_test(test_carving),       cmocka_unit_test(test_remove_box),
+        cmocka_unit_test(test_wall_friction),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

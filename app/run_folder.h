@@ -1,0 +1,37 @@
+/* A run and its folder: see run.c for the order of events. */
+#ifndef SKIFF_APP_RUN_FOLDER_H
+#define SKIFF_APP_RUN_FOLDER_H
+
+#include "cli.h"
+#include "pilot.h"
+#include "progress.h"
+#include "scene.h"
+#include "summary.h"
+#include "tables.h"
+#include "view.h"
+
+typedef struct Run {
+    const CliArgs *args;
+    Scene *scene;
+    SkiffSim *sim;
+    Pilot pilot;
+    Tables tables;
+    View *view; /* NULL: no pictures */
+    Progress progress;
+    double end_time;                    /* s, simulated */
+    double next_flush, next_checkpoint; /* s, wall clock */
+} Run;
+
+/* Whether the options fit what the output folder is. Changes nothing. */
+bool run_check_args(const CliArgs *args, Err *err);
+/* Begins the files of a new run, or loads the checkpoint and cuts the files back to it. */
+bool run_begin(Run *run, Err *err);
+/* Gives all rows to the operating system, and to the disk if `durable`. */
+bool run_flush(Run *run, bool durable, Err *err);
+/* Rows first, then the state under this name. */
+bool run_checkpoint(Run *run, const char *name, Err *err);
+bool run_close(Run *run, Err *err);
+/* summary.json, trace.json and report.html from the closed tables; prints the end. */
+bool run_write_results(Run *run, const RunEnd *end, Err *err);
+
+#endif

@@ -1,0 +1,95 @@
+/* Water at rest in any shape [Carensac2023 sec. 3]: points of a fluid that is at rest everywhere are laid
+ * over the place; near solids and existing water the ones too many are taken away by density alone
+ * (selection), and what is left there is let settle while all other water stands still (stabilisation).
+ *
+ * Initialisation, window moves and absorption all fill through rest_fill. It works on a cloud of its own: the
+ * points near solids and existing water and what surrounds them. Everything farther away is at rest as it
+ * comes and is taken over untouched. */
+#ifndef SKIFF_REST_H
+#define SKIFF_REST_H
+
+#include "dfsph.h"
+#include "tile.h"
+
+/* What a point of the cloud is. FLUID and AIR may feel a solid or existing water; SUPPORT and SUPPORT_AIR
+ * cannot and only surround them. FLUID that does becomes ACTIVE: the part that is stabilised. */
+typedef enum RestKind {
+    REST_FLUID,
+    REST_AIR,
+    REST_SUPPORT,
+    REST_SUPPORT_AIR,
+    REST_EXISTING,
+    REST_ACTIVE,
+    REST_RIM,
+    REST_EXISTING_RIM /* the same of existing water */
+} RestKind;
+
+/* Values of the params rest_rule, rest_protector and rest_schedule. */
+enum { REST_RULE_BASE, REST_RULE_REGULATOR, REST_RULE_PROTECTION };
+enum { REST_PROTECTOR_MARKED, REST_PROTECTOR_DENSER, REST_PROTECTOR_PRINTED };
+enum { REST_SCHEDULE_CONSTANT, REST_SCHEDULE_PRINTED };
+enum { REST_SETTLE_ALL, REST_SETTLE_CANDIDATES };
+
+/* Where water shall be. All of it window-local. */
+typedef enum RestPlace { REST_OUTSIDE, REST_IN_WATER, REST_IN_AIR } RestPlace;
+
+/* Water at rest that already fits the walls: what a window refills itself from. */
+typedef struct RestFitted {
+    uint32_t count;
+    Float4 *position;     /* m, window-local; [3] 0 */
+    float (*pressure)[2]; /* of the density and of the divergence solve, m^2 */
+} RestFitted;
+
+typedef struct RestRequest {
+    GridBounds bounds; /* of the water; air is taken from up to a support radius around */
+    float surface;     /* y of the still surface, m: gives depth and first pressure */
+    /* Is p in the water, or in the space over or beside it that only lends its density? Called from several
+     * threads. Not asked about walls and bodies: that is rest_fill's own business. */
+    RestPlace (*place)(const void *user, const float p[3]);
+    const void *user;
+    const RestFitted *fitted; /* NULL: the tile, shifted by `offset` (m, world) */
+    double offset[3];
+    double birth; /* s, of the new particles */
+} RestRequest;
+
+/* The points of a fill and what the stages need. Kept from fill to fill for its memory. */
+typedef struct RestCloud {
+    Particles points; /* id: RestKind in the upper half */
+    Grid grid;
+    Rows rows;
+    Boundary boundary; /* the simulation's samples with contacts of the cloud's own */
+    Dfsph dfsph;
+    Buffer marks, laid, source, fate;            /* rest_gather.c */
+    Buffer frozen, held;                         /* [points] 1: gets no row; gets one but does not move */
+    Buffer state, constant, sum, density, order; /* rest_select.c */
+} RestCloud;
+
+struct SkiffSim;
+
+/* Fills and appends the new particles to the simulation's. False: no memory, or the water is too dense
+ * anywhere; the simulation's particles are as they were. */
+bool rest_fill(struct SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err);
+void rest_cloud_free(RestCloud *cloud);
+
+/* The stages of rest_fill. */
+bool rest_gather(struct SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err);
+bool rest_select(struct SkiffSim *sim, SkiffFill *fill, Err *err);
+bool rest_settle(struct SkiffSim *sim, SkiffFill *fill, Err *err);
+/* The same for the simulation's particles with ids from `first_id` on; all others are held. */
+bool rest_settle_all(struct SkiffSim *sim, uint64_t first_id, SkiffFill *fill, Err *err);
+/* Sorts the cloud, freezes what is of no kind in `evaluated` (bits 1 << RestKind), and makes rows and
+ * boundary terms of the rest. */
+bool rest_search(struct SkiffSim *sim, uint32_t evaluated, Err *err);
+/* Distance from bodies and, if asked, walls, m: positive where water may be. An open tank goes on above its
+ * rim. */
+float rest_clearance(const struct SkiffSim *sim, const float p[3], bool walls);
+
+static inline RestKind rest_kind(uint64_t id) {
+    return (RestKind)(id >> 32);
+}
+
+static inline uint64_t rest_id(RestKind kind, uint64_t id) {
+    return (uint64_t)kind << 32 | (id & 0xffffffffu);
+}
+
+#endif

@@ -1,0 +1,277 @@
+/* First stage of a fill [Carensac2023 sec. 3 and 3.1]: lays the points of water at rest over the place,
+ * leaves out those in walls and bodies, and puts those that a solid or existing water can touch, with all
+ * that surrounds them, into the cloud. The others are at rest as they come: they are only listed.
+ *
+ * Which points are touched is first decided by cells of edge h, generously; the selection then goes by
+ * density. */
+#include "sim.h"
+
+#include <math.h>
+
+/* Fate of a point: for the cloud the RestKind plus IN_CLOUD. */
+enum { DROPPED, BULK, IN_CLOUD };
+
+/* Marks of a cell: a solid or existing water is in it, in one beside it, in one beside that; whether walls
+ * and bodies leave it alone. */
+enum { TOUCHED = 1, NEAR = 2, AROUND = 4, ALL_CLEAR = 8, ALL_SOLID = 16 };
+
+typedef struct Gather {
+    SkiffSim *sim;
+    const RestRequest *request;
+    CellGrid cells;
+    uint8_t *marks;
+    size_t cell_count;
+} Gather;
+
+float rest_clearance(const SkiffSim *sim, const float p[3], bool walls) {
+    float clearance = INFINITY;
+    if (walls && sim->tank.kind != SKIFF_GEOMETRY_NONE) {
+        const float rim = sim->tank.max[1] - sim->params.particle_radius;
+        const float q[3] = {p[0], sim->tank_open && p[1] > rim ? rim : p[1], p[2]};
+        clearance = -shape_distance(&sim->tank, q, NULL);
+    }
+    for (int b = 0; b < sim->body_count; b++) {
+        const Body *body = &sim->bodies[b];
+        double arm[3], apart_sq = 0.0;
+        float local[3];
+        for (int k = 0; k < 3; k++)
+            arm[k] = (double)p[k] + sim->origin[k] - body->position[k];
+        for (int k = 0; k < 3; k++) { /* R^T arm */
+            local[k] = (float)(body->matrix[0][k] * arm[0] + body->matrix[1][k] * arm[1] +
+                               body->matrix[2][k] * arm[2]);
+            const double out =
+                fmax((double)(body->mesh.min[k] - local[k]), (double)(local[k] - body->mesh.max[k]));
+            apart_sq += out > 0.0 ? out * out : 0.0;
+        }
+        /* the bounds are a lower bound of the distance, and enough where others are nearer */
+        if (apart_sq < (double)(clearance * clearance) || clearance < 0.0f)
+            clearance = fminf(clearance, apart_sq > 4.0 * (double)(sim->kernel.support * sim->kernel.support)
+                                             ? (float)sqrt(apart_sq)
+                                             : mesh_distance(&body->mesh, local, NULL));
+    }
+    return clearance;
+}
+
+/* What a point of water must keep from the true surface: half a radius from the samples [sec. 3.1]. */
+static float least_clearance(const SkiffSim *sim) {
+    return (0.5f - sim->params.boundary_offset) * sim->params.particle_radius;
+}
+
+/* ---- Cells ---- */
+
+static bool cell_of(const CellGrid *cells, const float *p, size_t *cell) {
+    int32_t c[3];
+    for (int k = 0; k < 3; k++) {
+        const float at = (p[k] - cells->origin[k]) * cells->inv_size;
+        c[k] = (int32_t)at;
+        if (!(at >= 0.0f) || c[k] >= cells->size[k])
+            return false;
+    }
+    *cell = (size_t)cell_grid_index(cells, c[0], c[1], c[2]);
+    return true;
+}
+
+static void mark_points(Gather *gather, const float *points, uint32_t count, uint8_t mark) {
+    size_t cell;
+    for (uint32_t i = 0; i < count; i++)
+        if (cell_of(&gather->cells, points + 4 * (size_t)i, &cell))
+            gather->marks[cell] |= mark;
+}
+
+/* Every cell beside one that has `from` gets `to`. */
+static void dilate(Gather *gather, uint8_t from, uint8_t to) {
+    const CellGrid *cells = &gather->cells;
+    for (int32_t x = 1; x + 1 < cells->size[0]; x++)
+        for (int32_t z = 1; z + 1 < cells->size[2]; z++)
+            for (int32_t y = 1; y + 1 < cells->size[1]; y++) {
+                if (!(gather->marks[cell_grid_index(cells, x, y, z)] & from))
+                    continue;
+                for (int32_t dx = -1; dx <= 1; dx++)
+                    for (int32_t dz = -1; dz <= 1; dz++)
+                        for (int32_t dy = -1; dy <= 1; dy++)
+                            gather->marks[cell_grid_index(cells, x + dx, y + dy, z + dz)] |= to;
+            }
+}
+
+/* One distance for a whole cell where that settles the matter: most are far from any wall. */
+static void mark_clearance(Gather *gather) {
+    const CellGrid *cells = &gather->cells;
+    const float edge = 1.0f / cells->inv_size, reach = 0.5f * sqrtf(3.0f) * edge;
+    const float least = least_clearance(gather->sim);
+#pragma omp parallel for schedule(dynamic, 1) num_threads(gather->sim->threads)
+    for (int32_t x = 0; x < cells->size[0]; x++)
+        for (int32_t z = 0; z < cells->size[2]; z++)
+            for (int32_t y = 0; y < cells->size[1]; y++) {
+                const float centre[3] = {cells->origin[0] + edge * ((float)x + 0.5f),
+                                         cells->origin[1] + edge * ((float)y + 0.5f),
+                                         cells->origin[2] + edge * ((float)z + 0.5f)};
+                const float clearance = rest_clearance(gather->sim, centre, gather->request->fitted == NULL);
+                uint8_t *mark = &gather->marks[cell_grid_index(cells, x, y, z)];
+                *mark |= clearance - reach > least ? ALL_CLEAR : clearance + reach < least ? ALL_SOLID : 0;
+            }
+}
+
+static bool make_cells(Gather *gather, Err *err) {
+    SkiffSim *sim = gather->sim;
+    const float support = sim->kernel.support;
+    GridBounds bounds = gather->request->bounds;
+    for (int k = 0; k < 3; k++) {
+        bounds.min[k] -= support;
+        bounds.max[k] += support;
+    }
+    if (!grid_layout(&gather->cells, &bounds, support, 2))
+        return err_set(err, ERR_INPUT, "the water to fill spans more than %d cells of %g m", GRID_MAX_CELLS,
+                       (double)support);
+    gather->cell_count =
+        (size_t)gather->cells.size[0] * (size_t)gather->cells.size[1] * (size_t)gather->cells.size[2];
+    if (!buffer_reserve(&sim->rest.marks, "cells to fill", gather->cell_count, err))
+        return false;
+    gather->marks = sim->rest.marks.data;
+    memset(gather->marks, 0, gather->cell_count);
+    if (gather->request->fitted == NULL && sim->boundary.fixed.samples.count > 0)
+        mark_points(gather, sim->boundary.fixed.world[0], sim->boundary.fixed.samples.count, TOUCHED);
+    if (sim->boundary.moving.samples.count > 0)
+        mark_points(gather, sim->boundary.moving.world[0], sim->boundary.moving.samples.count, TOUCHED);
+    if (sim->particles.count > 0)
+        mark_points(gather, sim->particles.position[0], sim->particles.count, TOUCHED);
+    dilate(gather, TOUCHED, NEAR);
+    dilate(gather, NEAR, AROUND);
+    /* fitted water keeps clear of the walls, and bodies are found by their samples' densities */
+    mark_clearance(gather);
+    return true;
+}
+
+/* ---- Points ---- */
+
+static uint8_t fate_of(const Gather *gather, const float p[3]) {
+    size_t cell;
+    if (!cell_of(&gather->cells, p, &cell))
+        return DROPPED;
+    const uint8_t mark = gather->marks[cell];
+    if (mark & ALL_SOLID)
+        return DROPPED;
+    const RestPlace place = gather->request->place(gather->request->user, p);
+    if (place == REST_OUTSIDE || (place == REST_IN_AIR && !(mark & AROUND)))
+        return DROPPED;
+    if (!(mark & ALL_CLEAR) &&
+        rest_clearance(gather->sim, p, gather->request->fitted == NULL) < least_clearance(gather->sim))
+        return DROPPED;
+    if (place == REST_IN_AIR)
+        return IN_CLOUD + (mark & NEAR ? REST_AIR : REST_SUPPORT_AIR);
+    return mark & NEAR ? IN_CLOUD + REST_FLUID : mark & AROUND ? IN_CLOUD + REST_SUPPORT : BULK;
+}
+
+/* Positions of all points that may matter, and which point of the source each is. */
+static bool lay_points(Gather *gather, uint32_t *count, Err *err) {
+    SkiffSim *sim = gather->sim;
+    RestCloud *cloud = &sim->rest;
+    const RestRequest *request = gather->request;
+    TileBox box = {.radius = (double)sim->params.particle_radius};
+    uint64_t laid = request->fitted != NULL ? request->fitted->count : 0;
+    for (int k = 0; k < 3; k++) {
+        box.offset[k] = request->offset[k];
+        box.min[k] = (double)(request->bounds.min[k] - sim->kernel.support) + sim->origin[k];
+        box.max[k] = (double)(request->bounds.max[k] + sim->kernel.support) + sim->origin[k];
+    }
+    if (request->fitted == NULL && !tile_count_box(&sim->tile, &box, &laid, err))
+        return false;
+    if (laid > 2000000000u)
+        return err_set(err, ERR_INPUT, "the water to fill takes %.4g points, the limit is 2e9", (double)laid);
+    *count = (uint32_t)laid;
+    if (!buffer_reserve(&cloud->laid, "points to fill", (size_t)laid * sizeof(float[3]), err) ||
+        !buffer_reserve(&cloud->source, "sources of points", (size_t)laid * sizeof(uint32_t), err) ||
+        !buffer_reserve(&cloud->fate, "fates of points", (size_t)laid, err))
+        return false;
+    if (request->fitted == NULL) {
+        tile_fill_box(&sim->tile, &box, sim->origin, cloud->laid.data, cloud->source.data);
+        return true;
+    }
+    float(*laid_at)[3] = cloud->laid.data;
+    uint32_t *source = cloud->source.data;
+    for (uint32_t i = 0; i < *count; i++) {
+        memcpy(laid_at[i], request->fitted->position[i], sizeof laid_at[i]);
+        source[i] = i;
+    }
+    return true;
+}
+
+/* P of still water at p: with a tile in the proportions that balance its points. */
+static void first_pressure(const Gather *gather, const float p[3], uint32_t source, float pressure[2]) {
+    const SkiffSim *sim = gather->sim;
+    const RestFitted *fitted = gather->request->fitted;
+    const float depth = gather->request->surface - p[1], dt = sim->params.time_step;
+    pressure[0] = depth > 0.0f ? -sim->params.gravity[1] * depth * dt * dt : 0.0f;
+    pressure[1] = 0.0f;
+    if (fitted != NULL) {
+        pressure[0] = fitted->pressure[source][0];
+        pressure[1] = fitted->pressure[source][1];
+    } else {
+        pressure[0] *= sim->tile.share[source];
+    }
+    pressure[0] = pressure[0] > 0.0f ? pressure[0] : 0.0f;
+}
+
+static void append(const Gather *gather, Particles *points, uint32_t i, uint64_t id, double birth) {
+    const float *p = ((const float(*)[3])gather->sim->rest.laid.data)[i];
+    const uint32_t to = particles_append(points, p, (const float[3]){0}, birth);
+    float pressure[2];
+    first_pressure(gather, p, ((const uint32_t *)gather->sim->rest.source.data)[i], pressure);
+    points->pressure[to] = pressure[0];
+    points->pressure_divergence[to] = pressure[1];
+    points->id[to] = id;
+}
+
+/* Existing water that the cloud's points can feel. */
+static void add_existing(Gather *gather) {
+    SkiffSim *sim = gather->sim;
+    Particles *points = &sim->rest.points;
+    memset(gather->marks, 0, gather->cell_count);
+    mark_points(gather, points->position[0], points->count, NEAR);
+    dilate(gather, NEAR, AROUND);
+    size_t cell;
+    for (uint32_t i = 0; i < sim->particles.count; i++) {
+        const float *p = sim->particles.position[i];
+        if (!cell_of(&gather->cells, p, &cell) || !(gather->marks[cell] & AROUND))
+            continue;
+        const uint32_t to = particles_append(points, p, sim->particles.velocity[i], 0.0);
+        points->id[to] = rest_id(REST_EXISTING, i);
+        points->pressure[to] = sim->particles.pressure[i];
+    }
+}
+
+bool rest_gather(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err) {
+    Gather gather = {.sim = sim, .request = request};
+    RestCloud *cloud = &sim->rest;
+    uint32_t laid;
+    if (!make_cells(&gather, err) || !lay_points(&gather, &laid, err))
+        return false;
+    uint8_t *fate = cloud->fate.data;
+    const float(*laid_at)[3] = cloud->laid.data;
+    uint32_t bulk = 0, near = 0;
+#pragma omp parallel for schedule(dynamic, 4096) num_threads(sim->threads) reduction(+ : bulk, near)
+    for (uint32_t i = 0; i < laid; i++) {
+        fate[i] = fate_of(&gather, laid_at[i]);
+        bulk += fate[i] == BULK;
+        near += fate[i] >= IN_CLOUD;
+    }
+    /* the cloud, in its order; then what exists around it */
+    cloud->points.count = 0;
+    fill->particles = bulk;
+    if (near == 0 && bulk == 0)
+        return true;
+    if (!particles_reserve(&cloud->points, near + sim->particles.count, err) ||
+        !buffer_reserve(&cloud->frozen, "frozen points", cloud->points.capacity + SLICE, err) ||
+        !buffer_reserve(&cloud->held, "held points", cloud->points.capacity + SLICE, err) ||
+        !sim_reserve(sim, sim->particles.count + bulk + near, err))
+        return false;
+    for (uint32_t i = 0; i < laid; i++)
+        if (fate[i] >= IN_CLOUD)
+            append(&gather, &cloud->points, i, rest_id((RestKind)(fate[i] - IN_CLOUD), cloud->points.count),
+                   0.0);
+    if (near > 0 && sim->particles.count > 0)
+        add_existing(&gather);
+    for (uint32_t i = 0; i < laid; i++)
+        if (fate[i] == BULK)
+            append(&gather, &sim->particles, i, sim->particles.next_id++, request->birth);
+    return true;
+}

@@ -1,0 +1,317 @@
+/* Second stage of a fill: which of the cloud's points stay [Carensac2023 sec. 3.1, 3.2 and algorithm 1].
+ *
+ * No point moves, so the rows are built once. Their weights are integers (PairData.weights), and so is the
+ * sum of a point's weights: taking a removed point out of its neighbours' sums is exact, costs only the
+ * removed points' rows, and gives the same numbers in any order.
+ *
+ * density = own + constant (walls, bodies, existing water) + sum over the cloud's other points, air included.
+ * Candidates are the points of water that feel a solid or existing water at all. */
+#include "sim.h"
+
+#include <math.h>
+
+/* State of a point during the selection. */
+enum { PASSIVE, CANDIDATE, MARKED, GONE };
+
+typedef struct Select {
+    const SkiffParams *params;
+    RestCloud *cloud;
+    uint32_t count, blocks;
+    int threads;
+    const PairData *pairs;
+    float unit; /* density of a weight of 1 */
+    float own;  /* density of a particle alone */
+    uint8_t *state;
+    float *constant;
+    int32_t *sum;
+    float *density;
+} Select;
+
+#define EACH_POINT                                                                                           \
+    _Pragma("omp parallel for schedule(static, BLOCK) num_threads(select->threads)") for (uint32_t i = 0;    \
+                                                                                          i < select->count; \
+                                                                                          i++)
+
+typedef struct Neighbour {
+    uint32_t index;
+    int32_t weight; /* in units of W(0) / 32767 */
+} Neighbour;
+
+/* Neighbours of point i from its row; unused places have no weight and are left out. */
+static int row_of(const Select *select, uint32_t i, Neighbour *row) {
+    const PairData *pairs = select->pairs;
+    const uint32_t slice = i / SLICE, lane = i % SLICE, first = slice * SLICE;
+    const uint32_t begin = pairs->slice_start[slice];
+    int count = 0;
+    for (uint32_t entry = begin; entry < begin + pairs->slice_length[slice]; entry++) {
+        const int32_t weight = pairs->weights[(size_t)entry * SLICE + lane];
+        if (weight == 0)
+            continue;
+        const int32_t offset = pairs->wide ? ((const RowEntryWide *)pairs->entries)[entry].index[lane]
+                                           : ((const RowEntry *)pairs->entries)[entry].index[lane];
+        row[count++] = (Neighbour){(uint32_t)((int32_t)first + offset), weight};
+    }
+    return count;
+}
+
+static RestKind kind_of(const Select *select, uint32_t i) {
+    return rest_kind(select->cloud->points.id[i]);
+}
+
+/* ---- Constant density and the early removals ---- */
+
+static void add_solids(Select *select) {
+    const Boundary *boundary = &select->cloud->boundary;
+    memset(select->constant, 0, select->count * sizeof *select->constant);
+    for (uint32_t block = 0; block < select->blocks; block++) {
+        const ContactSpan span = boundary->spans[block];
+        for (uint32_t c = span.start; c < span.start + span.count; c++)
+            select->constant[boundary->contacts[c].particle] += boundary->contacts[c].weight;
+    }
+}
+
+static void find_candidates(Select *select) {
+    /* half a radius is an eighth of the support; q = 1/8 in the kernel */
+    const int32_t too_close = (int32_t)(32767.0f * (1.0f - 6.0f / 64.0f * (1.0f - 1.0f / 8.0f)));
+    EACH_POINT {
+        const RestKind kind = kind_of(select, i);
+        select->state[i] = PASSIVE;
+        if (kind != REST_FLUID && kind != REST_AIR)
+            continue;
+        Neighbour row[MAX_NEIGHBOURS];
+        int32_t existing = 0, closest = 0;
+        const int length = row_of(select, i, row);
+        for (int k = 0; k < length; k++) {
+            if (kind_of(select, row[k].index) != REST_EXISTING)
+                continue;
+            existing += row[k].weight;
+            closest = row[k].weight > closest ? row[k].weight : closest;
+        }
+        select->constant[i] += select->unit * (float)existing;
+        if (closest > too_close || select->constant[i] > select->params->rest_max_constant)
+            select->state[i] = GONE;
+        else if (kind == REST_FLUID && select->constant[i] > 0.0f)
+            select->state[i] = CANDIDATE;
+    }
+}
+
+static void sum_weights(Select *select) {
+    EACH_POINT {
+        if (select->state[i] != CANDIDATE)
+            continue;
+        Neighbour row[MAX_NEIGHBOURS];
+        int32_t sum = 0;
+        const int length = row_of(select, i, row);
+        for (int k = 0; k < length; k++) {
+            const uint32_t j = row[k].index;
+            if (select->state[j] != GONE && kind_of(select, j) != REST_EXISTING)
+                sum += row[k].weight;
+        }
+        select->sum[i] = sum;
+    }
+}
+
+/* ---- Passes ---- */
+
+typedef struct DensitySums {
+    uint32_t count;
+    double mean, square; /* means of rho and of rho^2 */
+    float max;
+} DensitySums;
+
+static DensitySums measure(Select *select) {
+    EACH_POINT {
+        if (select->state[i] == CANDIDATE)
+            select->density[i] = select->own + select->constant[i] + select->unit * (float)select->sum[i];
+    }
+    DensitySums sums = {0};
+    for (uint32_t i = 0; i < select->count; i++) {
+        if (select->state[i] != CANDIDATE)
+            continue;
+        const double density = (double)select->density[i];
+        sums.count++;
+        sums.mean += density;
+        sums.square += density * density;
+        sums.max = fmaxf(sums.max, select->density[i]);
+    }
+    if (sums.count > 0) {
+        sums.mean /= sums.count;
+        sums.square /= sums.count;
+    }
+    return sums;
+}
+
+/* May j's going save i from going [sec. 3.1.1]? Of two equally dense the first in order counts as denser. */
+static bool shields(const Select *select, uint32_t j, uint32_t i) {
+    const bool marked = select->state[j] == MARKED;
+    const bool denser =
+        select->density[j] > select->density[i] || (select->density[j] == select->density[i] && j < i);
+    switch (select->params->rest_protector) {
+    case REST_PROTECTOR_DENSER:
+        return denser && (marked || select->state[j] == CANDIDATE);
+    case REST_PROTECTOR_PRINTED:
+        return marked;
+    default:
+        return denser && marked;
+    }
+}
+
+static bool is_protected(const Select *select, uint32_t i, float limit) {
+    Neighbour row[MAX_NEIGHBOURS];
+    const int length = row_of(select, i, row);
+    for (int k = 0; k < length; k++) {
+        const float share = select->unit * (float)row[k].weight;
+        if (share > select->params->rest_min_share && select->density[i] - share < limit &&
+            shields(select, row[k].index, i))
+            return true;
+    }
+    return false;
+}
+
+/* Marks go by the state at the start, so that no order of visits matters. Algorithm 1 as printed asks for no
+ * difference in density: two points would save each other for ever, unless marks are lifted one by one. */
+static void protect(Select *select, float limit) {
+    uint8_t *stays = select->cloud->fate.data; /* not needed any more */
+    if (select->params->rest_rule != REST_RULE_PROTECTION)
+        return;
+    if (select->params->rest_protector == REST_PROTECTOR_PRINTED) {
+        for (uint32_t i = 0; i < select->count; i++)
+            if (select->state[i] == MARKED && is_protected(select, i, limit))
+                select->state[i] = CANDIDATE;
+        return;
+    }
+    EACH_POINT {
+        stays[i] = select->state[i] == MARKED && is_protected(select, i, limit);
+    }
+    EACH_POINT {
+        if (stays[i])
+            select->state[i] = CANDIDATE;
+    }
+}
+
+static void remove_above(Select *select, float limit) {
+    EACH_POINT {
+        if (select->state[i] == CANDIDATE && select->density[i] > limit)
+            select->state[i] = MARKED;
+    }
+    protect(select, limit);
+    for (uint32_t i = 0; i < select->count; i++) {
+        if (select->state[i] != MARKED)
+            continue;
+        select->state[i] = GONE;
+        Neighbour row[MAX_NEIGHBOURS];
+        const int length = row_of(select, i, row);
+        for (int n = 0; n < length; n++)
+            select->sum[row[n].index] -= row[n].weight;
+    }
+}
+
+/* Sec. 3.1.2. Densities are in units of rest density. */
+static float next_step(const SkiffParams *params, float step, double mean) {
+    if (params->rest_rule == REST_RULE_BASE || (params->rest_freeze && step <= params->rest_min_step))
+        return step;
+    double wanted = (mean - (double)params->rest_target) * (double)params->rest_ratio;
+    if (params->rest_round) /* the authors' code counts whole kg/m^3 */
+        wanted = (floor(1000.0 * wanted) + 1.0) / 1000.0;
+    return wanted > (double)params->rest_min_step ? (float)wanted : params->rest_min_step;
+}
+
+static void run_passes(Select *select, SkiffFill *fill) {
+    const SkiffParams *params = select->params;
+    DensitySums sums = measure(select);
+    float limit = sums.max, step = params->rest_step;
+    fill->passes = 1;
+    fill->candidates = sums.count;
+    while (sums.count > 0 && sums.mean >= (double)params->rest_target) {
+        step = next_step(params, step, sums.mean);
+        limit = fmaxf(limit - step, params->rest_target);
+        remove_above(select, limit);
+        sums = measure(select);
+        fill->passes++;
+    }
+    fill->selected = sums.count;
+    fill->density_mean = sums.mean;
+    fill->density_spread = sqrt(fmax(0.0, sums.square - sums.mean * sums.mean));
+    fill->density_rms = sqrt(fmax(0.0, sums.square + (double)params->rest_target *
+                                                         ((double)params->rest_target - 2.0 * sums.mean)));
+}
+
+/* ---- The stage ---- */
+
+static bool reserve(Select *select, Err *err) {
+    RestCloud *cloud = select->cloud;
+    const size_t n = select->count;
+    if (!buffer_reserve(&cloud->state, "states of points", n, err) ||
+        !buffer_reserve(&cloud->constant, "constant densities", n * sizeof(float), err) ||
+        !buffer_reserve(&cloud->sum, "sums of weights", n * sizeof(int32_t), err) ||
+        !buffer_reserve(&cloud->density, "densities of points", n * sizeof(float), err) ||
+        !buffer_reserve(&cloud->order, "points to keep", n * sizeof(uint32_t), err) ||
+        !buffer_reserve(&cloud->fate, "fates of points", n, err))
+        return false;
+    select->state = cloud->state.data;
+    select->constant = cloud->constant.data;
+    select->sum = cloud->sum.data;
+    select->density = cloud->density.data;
+    return true;
+}
+
+/* What stands beside the candidates that are left. */
+static void mark_rim(Select *select) {
+    uint64_t *id = select->cloud->points.id;
+    for (uint32_t i = 0; i < select->count; i++) {
+        if (select->state[i] != CANDIDATE)
+            continue;
+        Neighbour row[MAX_NEIGHBOURS];
+        const int length = row_of(select, i, row);
+        for (int k = 0; k < length; k++) {
+            const uint32_t j = row[k].index;
+            const RestKind kind = rest_kind(id[j]);
+            if (kind == REST_EXISTING)
+                id[j] = rest_id(REST_EXISTING_RIM, id[j]);
+            else if (select->state[j] == PASSIVE && (kind == REST_FLUID || kind == REST_SUPPORT))
+                id[j] = rest_id(REST_RIM, id[j]);
+        }
+    }
+}
+
+/* Air and what was removed goes; what stays is told apart by how it takes part in the stabilisation. */
+static void keep_selected(Select *select, SkiffFill *fill) {
+    Particles *points = &select->cloud->points;
+    uint32_t kept = 0, *order = select->cloud->order.data;
+    mark_rim(select);
+    fill->active = 0;
+    for (uint32_t i = 0; i < select->count; i++) {
+        const RestKind kind = kind_of(select, i);
+        if (select->state[i] == GONE || kind == REST_AIR || kind == REST_SUPPORT_AIR)
+            continue;
+        if (select->state[i] == CANDIDATE) {
+            points->id[i] = rest_id(REST_ACTIVE, points->id[i]);
+            fill->active++;
+        }
+        fill->rim += kind == REST_RIM || kind == REST_EXISTING_RIM;
+        order[kept++] = i;
+    }
+    particles_permute(points, order, kept, select->threads);
+}
+
+bool rest_select(SkiffSim *sim, SkiffFill *fill, Err *err) {
+    RestCloud *cloud = &sim->rest;
+    if (cloud->points.count == 0)
+        return true;
+    Select select = {.params = &sim->params,
+                     .cloud = cloud,
+                     .count = cloud->points.count,
+                     .blocks = particles_blocks(&cloud->points),
+                     .threads = sim->threads,
+                     .pairs = &cloud->rows.pairs};
+    if (!rest_search(sim, 1u << REST_FLUID | 1u << REST_AIR, err) || !reserve(&select, err))
+        return false;
+    select.own = sim->volume * sim->kernel.w_scale;
+    select.unit = select.own / 32767.0f;
+    add_solids(&select);
+    find_candidates(&select);
+    sum_weights(&select);
+    run_passes(&select, fill);
+    keep_selected(&select, fill);
+    return true;
+}

@@ -1,0 +1,290 @@
+/* Last stage of a fill: what was selected settles [Carensac2023 sec. 3.3]. And the fill as a whole.
+ *
+ * A step: search, (divergence solve,) gravity, viscosity and calming without limit, density solve, damping,
+ * motion: the solver's own. Bodies are held. Errors are means over the active particles.
+ *
+ * restSettle candidates, the paper's way: in the cloud, with rows for the candidates and what stands beside
+ * them. All other points stand still and keep the pressure that still water has at their place: for the solve
+ * it is a boundary condition, so what is active settles under the load it will carry, and pressures of points
+ * that cannot move do not pile up.
+ *
+ * restSettle all: in the simulation itself, all new water. A thin layer between walls and water that cannot
+ * yield ends crowded or starved wherever the selection took one point too few or too many, and so the first
+ * free steps move everything; and a cut through water at rest is no free surface at rest. */
+#include "sim.h"
+
+#include <math.h>
+
+/* alpha of the printed schedule, from the first to the last step [sec. 5.1] */
+static const double FIRST_ALPHA = 0.8, LAST_ALPHA = 0.1;
+/* Calming without limit: nothing that settles moves as it should. m/s^2 */
+static const float NO_LIMIT = 1e3f;
+
+/* What settles, and with what. */
+typedef struct Settle {
+    SkiffSim *sim;
+    SkiffParams params; /* the simulation's, changed for the purpose */
+    Particles *particles;
+    Grid *grid;
+    Rows *rows;
+    Boundary *boundary;
+    Dfsph *dfsph;
+    const uint8_t *frozen; /* [particles] 1: no row; or NULL */
+    const uint8_t *held;   /* [particles] 1: does not move; or NULL */
+    uint32_t active;
+} Settle;
+
+/* ---- Search ---- */
+
+static bool settle_sort(Settle *settle, Err *err) {
+    const GridBounds everywhere = {{-INFINITY, -INFINITY, -INFINITY}, {INFINITY, INFINITY, INFINITY}};
+    return grid_sort(settle->grid, settle->particles, settle->sim->kernel.support, &everywhere, NULL,
+                     settle->sim->threads, err);
+}
+
+static bool settle_rows(Settle *settle, Err *err) {
+    SkiffSim *sim = settle->sim;
+    const RowsJob job = {.passes = sim->passes,
+                         .grid = settle->grid,
+                         .particles = settle->particles,
+                         .kernel = &sim->kernel,
+                         .volume = sim->volume,
+                         .frozen = settle->frozen,
+                         .threads = sim->threads};
+    return rows_build(settle->rows, &job, err) && boundary_apply(settle->boundary, settle->rows, &job, err);
+}
+
+static Settle settle_cloud(SkiffSim *sim) {
+    RestCloud *cloud = &sim->rest;
+    return (Settle){.sim = sim,
+                    .params = sim->params,
+                    .particles = &cloud->points,
+                    .grid = &cloud->grid,
+                    .rows = &cloud->rows,
+                    .boundary = &cloud->boundary,
+                    .dfsph = &cloud->dfsph,
+                    .frozen = cloud->frozen.data,
+                    .held = cloud->held.data};
+}
+
+bool rest_search(SkiffSim *sim, uint32_t evaluated, Err *err) {
+    RestCloud *cloud = &sim->rest;
+    Particles *points = &cloud->points;
+    Settle settle = settle_cloud(sim);
+    if (!settle_sort(&settle, err))
+        return false;
+    uint8_t *frozen = cloud->frozen.data, *held = cloud->held.data;
+    const uint32_t padded = particles_blocks(points) * BLOCK;
+    for (uint32_t i = 0; i < padded; i++) {
+        const RestKind kind = rest_kind(points->id[i]);
+        frozen[i] = i >= points->count || !(evaluated & 1u << kind);
+        held[i] = kind != REST_ACTIVE;
+    }
+    /* the samples are the simulation's, the contacts the cloud's own */
+    cloud->boundary.fixed = sim->boundary.fixed;
+    cloud->boundary.moving = sim->boundary.moving;
+    if (!boundary_reserve(&cloud->boundary, points->capacity, sim->body_count, err))
+        return false;
+    boundary_place_centres(&cloud->boundary, sim->bodies, sim->body_count, sim->origin);
+    return settle_rows(&settle, err);
+}
+
+/* ---- Steps ---- */
+
+typedef struct SpeedSums {
+    double mean, max;
+} SpeedSums;
+
+static SpeedSums measure_speeds(const Settle *settle) {
+    SpeedSums sums = {0};
+    for (uint32_t i = 0; i < settle->particles->count; i++) {
+        if (settle->held != NULL && settle->held[i])
+            continue;
+        const float *v = settle->particles->velocity[i];
+        const double speed = sqrt((double)(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]));
+        sums.mean += speed;
+        sums.max = speed <= sums.max ? sums.max : speed;
+    }
+    sums.mean /= settle->active;
+    return sums;
+}
+
+static void move_active(const Settle *settle, float kept) {
+    Particles *particles = settle->particles;
+    const float dt = settle->params.time_step;
+#pragma omp parallel for schedule(static) num_threads(settle->sim->threads)
+    for (uint32_t i = 0; i < particles->count; i++) {
+        if (settle->held != NULL && settle->held[i])
+            continue;
+        for (int k = 0; k < 3; k++) {
+            particles->velocity[i][k] *= kept;
+            particles->position[i][k] += dt * particles->velocity[i][k];
+        }
+    }
+}
+
+static float kept_share(const SkiffParams *params, int step) {
+    if (params->rest_schedule == REST_SCHEDULE_CONSTANT || params->rest_steps < 2)
+        return params->rest_retention;
+    const double fall = pow(LAST_ALPHA / FIRST_ALPHA, (double)step / (params->rest_steps - 1));
+    return (float)(1.0 - FIRST_ALPHA * fall);
+}
+
+/* P is p dt^2 / rho0: another time step, another P. */
+static void scale_pressures(Particles *particles, float factor) {
+    for (uint32_t i = 0; i < particles->count; i++) {
+        particles->pressure[i] *= factor;
+        particles->pressure_divergence[i] *= factor;
+    }
+}
+
+/* Sorts, and says who takes part: in the cloud by kind, in the simulation everyone with an id from `first_id`
+ * on. */
+typedef bool SettleSearch(Settle *settle, uint64_t first_id, Err *err);
+
+static bool search_cloud(Settle *settle, uint64_t first_id, Err *err) {
+    (void)first_id;
+    return rest_search(settle->sim, 1u << REST_ACTIVE, err);
+}
+
+static bool search_all(Settle *settle, uint64_t first_id, Err *err) {
+    if (!settle_sort(settle, err))
+        return false;
+    uint8_t *held = settle->sim->rest.held.data;
+    for (uint32_t i = 0; i < settle->particles->count; i++)
+        held[i] = settle->particles->id[i] < first_id;
+    return settle_rows(settle, err);
+}
+
+static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, SkiffFill *fill, Err *err) {
+    SkiffParams *params = &settle->params;
+    const double unit = (double)(params->particle_radius / params->time_step);
+    const float scale = params->rest_time_scale;
+    params->max_density_error = params->rest_density_error;
+    params->softening = params->rest_softening;
+    params->feedforward = 0.0f;
+    params->time_step *= scale;
+    if (params->calming > 0.0f)
+        params->calming_limit = NO_LIMIT;
+    const DfsphProblem problem = {.params = params,
+                                  .passes = settle->sim->passes,
+                                  .rows = settle->rows,
+                                  .boundary = settle->boundary,
+                                  .particles = settle->particles,
+                                  .held = settle->held,
+                                  .evaluated_count = settle->active,
+                                  .threads = settle->sim->threads};
+    scale_pressures(settle->particles, scale * scale);
+    bool calm = false;
+    for (fill->steps = 0; fill->steps < params->rest_steps && !calm; fill->steps++) {
+        if (!search(settle, first_id, err))
+            return false;
+        if (params->rest_divergence)
+            dfsph_solve(settle->dfsph, &problem, SOLVE_DIVERGENCE);
+        forces_apply_fluid(&problem, settle->dfsph);
+        dfsph_solve(settle->dfsph, &problem, SOLVE_DENSITY);
+        const SpeedSums speeds = measure_speeds(settle);
+        fill->mean_speed = speeds.mean;
+        fill->max_speed = speeds.max;
+        calm = fill->steps + 1 >= params->rest_min_steps &&
+               speeds.max < (double)params->rest_max_speed * unit &&
+               speeds.mean < (double)params->rest_mean_speed * unit;
+        move_active(settle, kept_share(params, fill->steps));
+    }
+    scale_pressures(settle->particles, 1.0f / (scale * scale));
+    return true;
+}
+
+/* The cloud's new water joins the simulation's. */
+static void take_over(SkiffSim *sim, double birth, SkiffFill *fill) {
+    const Particles *points = &sim->rest.points;
+    for (uint32_t i = 0; i < points->count; i++) {
+        const RestKind kind = rest_kind(points->id[i]);
+        if (kind == REST_EXISTING)
+            continue;
+        const uint32_t to =
+            particles_append(&sim->particles, points->position[i], (const float[3]){0}, birth);
+        sim->particles.pressure[to] = points->pressure[i];
+        sim->particles.pressure_divergence[to] = points->pressure_divergence[i];
+        fill->particles++;
+    }
+}
+
+bool rest_settle(SkiffSim *sim, SkiffFill *fill, Err *err) {
+    if (fill->active == 0)
+        return true;
+    Settle settle = settle_cloud(sim);
+    settle.active = fill->active;
+    return dfsph_reserve(&sim->rest.dfsph, sim->rest.points.capacity, 1 + (uint32_t)sim->body_count, err) &&
+           run_steps(&settle, search_cloud, 0, fill, err);
+}
+
+bool rest_settle_all(SkiffSim *sim, uint64_t first_id, SkiffFill *fill, Err *err) {
+    fill->active = fill->particles;
+    if (fill->active == 0)
+        return true;
+    if (!buffer_reserve(&sim->rest.held, "held particles", sim->particles.capacity + SLICE, err))
+        return false;
+    const bool nothing_else = fill->active == sim->particles.count;
+    memset(sim->rest.held.data, 0, sim->particles.capacity + SLICE);
+    Settle settle = {.sim = sim,
+                     .params = sim->params,
+                     .particles = &sim->particles,
+                     .grid = &sim->grid,
+                     .rows = &sim->rows,
+                     .boundary = &sim->boundary,
+                     .dfsph = &sim->dfsph,
+                     .held = nothing_else ? NULL : sim->rest.held.data,
+                     .active = fill->active};
+    const bool good = run_steps(&settle, search_all, first_id, fill, err);
+    for (uint32_t i = 0; i < sim->particles.count; i++)
+        if (sim->particles.id[i] >= first_id)
+            memset(sim->particles.velocity[i], 0, sizeof(Float4));
+    return good;
+}
+
+/* Takes the new particles out again, in a fill that failed. */
+static void undo(SkiffSim *sim, uint64_t first_id) {
+    uint32_t kept = 0, *order = sim->rest.source.data;
+    for (uint32_t i = 0; i < sim->particles.count; i++)
+        if (sim->particles.id[i] < first_id)
+            order[kept++] = i;
+    particles_permute(&sim->particles, order, kept, sim->threads);
+}
+
+bool rest_fill(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err) {
+    *fill = (SkiffFill){0};
+    const uint64_t first_id = sim->particles.next_id;
+    const bool all = sim->params.rest_settle == REST_SETTLE_ALL;
+    const double start = timer_ms();
+    if (request->fitted == NULL && sim->tile.count == 0 && !tile_load_default(&sim->tile, err))
+        return false;
+    bool good = rest_gather(sim, request, fill, err);
+    const double gathered = timer_ms();
+    good = good && rest_select(sim, fill, err);
+    const double selected = timer_ms();
+    good = good && (all || rest_settle(sim, fill, err));
+    if (good)
+        take_over(sim, request->birth, fill);
+    good = good && (!all || rest_settle_all(sim, first_id, fill, err));
+    if (!good)
+        undo(sim, first_id);
+    fill->load_ms = gathered - start;
+    fill->select_ms = selected - gathered;
+    fill->settle_ms = timer_ms() - selected;
+    return good;
+}
+
+void rest_cloud_free(RestCloud *cloud) {
+    particles_free(&cloud->points);
+    grid_free(&cloud->grid);
+    rows_free(&cloud->rows);
+    cloud->boundary.fixed = cloud->boundary.moving = (BoundarySet){0};
+    boundary_free(&cloud->boundary);
+    dfsph_free(&cloud->dfsph);
+    Buffer *buffers[] = {&cloud->marks,  &cloud->laid,    &cloud->source, &cloud->fate,
+                         &cloud->frozen, &cloud->held,    &cloud->state,  &cloud->constant,
+                         &cloud->sum,    &cloud->density, &cloud->order};
+    for (size_t b = 0; b < sizeof buffers / sizeof *buffers; b++)
+        buffer_free(buffers[b]);
+}
