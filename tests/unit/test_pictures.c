@@ -234,6 +234,22 @@ static void a_scene_can_ask_for_pictures(void **unused) {
     expect("run scene.json -o other --set Render.camera=mast -q", 3, "there are crate_view, chase,");
 }
 
+static void input_files_cut_to_cameras(void **unused) {
+    (void)unused;
+    need_gl();
+    assert_true(file_write("cut.input", "0.02 camera top\n", 16, NULL));
+    assert_true(file_write("bad.input", "0 camera chase\n0.02 camera mast\n", 32, NULL));
+    expect("run " SMALL " -o cut --input cut.input --size 96x64 --fps 50 --duration 0.042 --hud off -q", 0,
+           "");
+    expect("run " SMALL " -o uncut --size 96x64 --fps 50 --duration 0.042 --hud off -q", 0, "");
+    expect("run " SMALL " -o top --camera top --size 96x64 --fps 50 --duration 0.042 --hud off -q", 0, "");
+    assert_true(same_frame("cut", "uncut", 1) && same_frame("cut", "top", 3));
+    assert_false(same_frame("cut", "uncut", 3));
+    expect("run " SMALL " -o bad --input bad.input --render", 3,
+           "bad.input:2: there is no camera \"mast\"; there are chase,");
+    assert_false(file_exists("bad"));
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(words_are_the_renderers),
@@ -245,6 +261,7 @@ int main(void) {
         cmocka_unit_test(export_needs_no_gl),
         cmocka_unit_test(a_resumed_run_goes_on_filming),
         cmocka_unit_test(a_scene_can_ask_for_pictures),
+        cmocka_unit_test(input_files_cut_to_cameras),
     };
     return cmocka_run_group_tests_name("pictures", tests, make_folder, remove_folder);
 }
