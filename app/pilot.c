@@ -6,6 +6,7 @@
 #include "engine/base/file.h"
 #include "engine/base/log.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -146,4 +147,26 @@ void pilot_free(Pilot *pilot) {
     free(pilot->text);
     script_free(&pilot->script);
     *pilot = (Pilot){0};
+}
+
+/* ---- For pictures ---- */
+
+void pilot_show(const Pilot *pilot, const SkiffSim *sim, FrameControls *controls) {
+    const Helm *helm = &pilot->helm;
+    const HelmPosition position = helm_position(helm);
+    size_t used = 0;
+    *controls = (FrameControls){.throttle = NAN, .rudder = NAN, .has_keys = pilot->text != NULL};
+    if (skiff_drive_count(sim) > 0) {
+        const SkiffDrive drive = skiff_drive(sim, 0);
+        controls->throttle = drive.controls.throttle;
+        controls->rudder = drive.controls.hold ? drive.rudder : drive.controls.rudder;
+    }
+    for (int k = 0; k < helm->key_count; k++) {
+        const size_t length = strlen(helm->keys[k].key);
+        if (!helm->held[k] || used + length + 2 > sizeof controls->keys)
+            continue; /* hands hold few keys: more than the picture has room for are not shown */
+        used += (size_t)snprintf(controls->keys + used, sizeof controls->keys - used, "%s%s",
+                                 used > 0 ? " " : "", helm->keys[k].key);
+    }
+    snprintf(controls->camera, sizeof controls->camera, "%s", position.camera);
 }

@@ -32,8 +32,18 @@ static Scene *load_scene(const CliArgs *args, Err *err) {
 
 /* ---- The game loop ---- */
 
+static bool draw_frames(Run *run, Err *err) {
+    ViewControls controls = view_controls_none();
+    controls.step_ms = skiff_stats(run->sim)->step_ms;
+    if (run->view)
+        pilot_show(&run->pilot, run->sim, &controls.driven);
+    return !run->view || view_step(run->view, run->sim, &controls, err);
+}
+
 static bool after_step(Run *run, Err *err) {
     tables_add(&run->tables, run->sim);
+    if (!draw_frames(run, err))
+        return false;
     progress_step(&run->progress, run->sim);
     double now = run->progress.last;
     if (now >= run->next_flush) {
@@ -73,8 +83,8 @@ static bool step_to_end(Run *run, Err *err) {
 static bool end_diverged(Run *run, Err *err) {
     Err other = {0};
     RunEnd end = {"diverged", err->message};
-    if (!run_checkpoint(run, "diverged.skiff", &other) || !run_close(run, &other) ||
-        !run_write_results(run, &end, &other))
+    if (!view_finish(run->view, &other) || !run_checkpoint(run, "diverged.skiff", &other) ||
+        !run_close(run, &other) || !run_write_results(run, &end, &other))
         err_add(err, ERR_DIVERGED, "%s", other.message);
     else
         err_add(err, ERR_DIVERGED, "the state is in %s/diverged.skiff", run->args->output);
@@ -86,7 +96,7 @@ static bool end_normally(Run *run, Err *err) {
     RunEnd end = {interrupted ? "interrupted" : "finished", ""};
     if (!interrupted)
         pilot_report_left(&run->pilot);
-    if (!run_checkpoint(run, "state.skiff", err) || !run_close(run, err) ||
+    if (!view_finish(run->view, err) || !run_checkpoint(run, "state.skiff", err) || !run_close(run, err) ||
         !run_write_results(run, &end, err))
         return false;
     return !interrupted ||
@@ -97,6 +107,30 @@ static bool end_normally(Run *run, Err *err) {
 static void log_line(LogLevel level, const char *message, void *user) {
     progress_clear(user);
     fprintf(stderr, "skiff: %s%s\n", level == LOG_WARNING ? "warning: " : "", message);
+}
+
+/* Cameras that the input file cuts to must exist before hours have been spent. */
+static bool check_cuts(const Run *run, Err *err) {
+    const Script *script = &run->pilot.script;
+    for (size_t i = 0; i < script->count; i++)
+        if (script->events[i].command == SCRIPT_CAMERA &&
+            !view_check_camera(run->view, script->events[i].camera, err)) {
+            err_prefix(err, "%s:%d", run->pilot.file, script->events[i].line);
+            return false;
+        }
+    return true;
+}
+
+static bool make_view(Run *run, Err *err) {
+    ViewOptions options;
+    if (!view_options_make(&options, run->args, run->scene, err))
+        return false;
+    if (!view_options_needed(&options))
+        return true;
+    run->view = view_create(&options, run->scene, run->sim, err);
+    if (!run->view)
+        return err->code != ERR_GL ? false : err_add(err, ERR_GL, "--no-render simulates without pictures");
+    return !options.draws || options.keeps_camera || check_cuts(run, err);
 }
 
 static bool run_scene(Run *run, Err *err) {
@@ -112,6 +146,8 @@ static bool run_scene(Run *run, Err *err) {
     if (interrupt_pending())
         return err_set(err, ERR_INTERRUPTED,
                        "skiff run: interrupted before the first step; nothing was written");
+    if (!make_view(run, err))
+        return false;
     run->end_time = run->scene->def.start_time + run->scene->duration;
     if (!run_begin(run, err))
         return false;
@@ -128,6 +164,7 @@ bool run_command(const CliArgs *args, Err *err) {
     log_set_sink(NULL, NULL, LOG_WARNING);
     run_close(&run, NULL);
     pilot_free(&run.pilot);
+    view_destroy(run.view);
     skiff_destroy(run.sim);
     scene_free(run.scene);
     return ok;

@@ -8,6 +8,7 @@
 #include "scene.h"
 #include "summary.h"
 #include "tables.h"
+#include "view.h"
 
 typedef struct Run {
     const CliArgs *args;
@@ -15,6 +16,7 @@ typedef struct Run {
     SkiffSim *sim;
     Pilot pilot;
     Tables tables;
+    View *view; /* NULL: no pictures */
     Progress progress;
     double end_time;                    /* s, simulated */
     double next_flush, next_checkpoint; /* s, wall clock */

@@ -157,6 +157,7 @@ static void fill_def(Scene *scene) {
     scene->key_count = file->keys.count;
     scene->duration = configuration->duration;
     scene->probe_rate = configuration->probe_rate;
+    scene->render = file->render;
 }
 
 /* ---- Reading ---- */

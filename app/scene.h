@@ -16,7 +16,8 @@ typedef struct Scene {
     const char *input; /* input file, as a path that can be opened; NULL: none */
     const ScriptKey *keys;
     int key_count;
-    SkiffDef def; /* strings and arrays belong to the scene */
+    SkiffDef def;                     /* strings and arrays belong to the scene */
+    const struct SceneRender *render; /* NULL: the file has no section "Render" */
     struct SceneContent *content;
 } Scene;
 

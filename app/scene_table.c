@@ -1,26 +1,9 @@
 /* Every key of a scene file, once. Keys, meanings and units follow SPlisHSPlasH scenes where there is such a
  * thing; keys of Configuration that set the simulation come from the engine's own list (engine/params.inl).
  */
-#include "scene_table.h"
+#include "scene_rows.h"
 
-#include <math.h>
 #include <string.h>
-
-#define COUNT(table) ((int)(sizeof(table) / sizeof *(table)))
-#define COORDINATE   .min = -1e5, .max = 1e5, .unit = "m"
-#define LENGTH       .min = 1e-4, .max = 1e5, .unit = "m"
-#define SPEED        .min = -1e4, .max = 1e4, .unit = "m/s"
-#define DURATION     .min = 0, .max = 1e6, .unit = "s"
-
-static void set3(float out[3], float x, float y, float z) {
-    out[0] = x;
-    out[1] = y;
-    out[2] = z;
-}
-
-static bool is_given(const float vector[3]) {
-    return !isnan(vector[0]);
-}
 
 static void check_corners(const float min[3], const float max[3], const char *min_key, const char *max_key,
                           Problems *problems) {
@@ -77,9 +60,6 @@ static bool param_row(int index, Field *field) {
         *field = info_row(&infos[index], offsetof(SceneConfiguration, params));
     return index < count;
 }
-
-#define ROW(field_type, struct_type, member, json_key)                                                       \
-    .key = json_key, .type = field_type, .offset = offsetof(struct_type, member)
 
 static const Field configuration_fields[] = {
     {ROW(FIELD_DOUBLE, SceneConfiguration, duration, "duration"), .min = 1e-6, .max = 1e6, .unit = "s",
@@ -633,6 +613,8 @@ static const Field file_fields[] = {
      .help = "Input file that drives, relative to the scene; `skiff run --input` takes its place"},
     {ROW(FIELD_LIST, SceneFile, keys, "Keys"), .max = SCRIPT_MAX_KEYS, .object = &key_type,
      .help = "Keys that input files can press; absent: w s a d, z q and the arrows"},
+    {ROW(FIELD_OBJECT, SceneFile, render, "Render"), .flags = FIELD_NULLABLE, .object = &scene_render_type,
+     .help = "Frames; absent: none, unless the command line asks for them"},
 };
 
 static const FieldRule file_rules[] = {{"Keys", check_keys}};

@@ -290,6 +290,9 @@ const uint8_t *skiff_body_materials(const SkiffSim *sim, int index);
 /* "" past the last one, and for faces before the first record. */
 const char *skiff_body_material_name(const SkiffSim *sim, int index, int material);
 
+/* The surface of the tank, window-local; no triangles where there is none. Owned by the simulation. */
+void skiff_tank_mesh(const SkiffSim *sim, const float (**vertices)[3], uint32_t *vertex_count,
+                     const uint32_t (**triangles)[3], uint32_t *triangle_count);
 /* ---- Driving. Drives are numbered in the order of their bodies. ---- */
 
 /* What the helmsman does. All zero: nothing. */
