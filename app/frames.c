@@ -61,32 +61,22 @@ static bool frame_reserve(Frame *frame, uint64_t count, int body_count, Err *err
 
 /* ---- From a simulation ---- */
 
-/* Recently removed particles, and the window, as the engine will tell them. */
-typedef struct Ghosts {
-    uint32_t count;
-    const float (*position)[4];
-    const float (*velocity)[4];
-    const uint64_t *id;
-    const double *birth, *removed;
-} Ghosts;
-
-static Ghosts ghosts_of(const SkiffSim *sim) {
-    (void)sim;
-    return (Ghosts){0};
-}
-
 static bool window_of(const SkiffSim *sim, Frame *frame) {
-    (void)sim;
-    (void)frame;
-    return false;
+    SkiffWindow window;
+    if (!skiff_window(sim, &window))
+        return false;
+    memcpy(frame->window_centre, window.centre, sizeof frame->window_centre);
+    frame->level = window.level;
+    frame->moves = window.moves;
+    return true;
 }
 
 bool frame_window_distances(const SkiffSim *sim, const float (*points)[4], uint32_t count, float *distance) {
-    (void)sim;
-    (void)points;
-    (void)count;
-    (void)distance;
-    return false;
+    SkiffWindow window;
+    if (!skiff_window(sim, &window))
+        return false;
+    skiff_window_distances(sim, points, count, distance);
+    return true;
 }
 
 void frame_poses(const SkiffSim *sim, FrameBody *bodies) {
@@ -138,7 +128,7 @@ static void copy_particles(Frame *frame, const SkiffParticles *particles, float 
     }
 }
 
-static void copy_ghosts(Frame *frame, const Ghosts *ghosts) {
+static void copy_ghosts(Frame *frame, const SkiffGhosts *ghosts) {
     for (uint32_t g = 0; g < ghosts->count; g++) {
         uint32_t i = frame->count++;
         /* Negative: it was removed between the frame's time and the end of the step, and is still all there.
@@ -159,7 +149,7 @@ static void copy_ghosts(Frame *frame, const Ghosts *ghosts) {
 bool frame_capture(Frame *frame, const SkiffSim *sim, const FrameBody *before, double before_time,
                    double time, Err *err) {
     SkiffParticles particles = skiff_particles(sim);
-    Ghosts ghosts = ghosts_of(sim);
+    SkiffGhosts ghosts = skiff_ghosts(sim);
     if (!frame_reserve(frame, (uint64_t)particles.count + ghosts.count, skiff_body_count(sim), err))
         return false;
     double end = skiff_time(sim);

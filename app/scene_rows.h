@@ -1,4 +1,5 @@
-/* What the files of scene tables write their rows with: scene_table.c, scene_render.c. */
+/* What the files of scene tables write their rows with: scene_table.c, scene_render.c,
+ * scene_sea.c. */
 #ifndef SKIFF_APP_SCENE_ROWS_H
 #define SKIFF_APP_SCENE_ROWS_H
 
@@ -28,5 +29,7 @@ static inline bool is_given(const float vector[3]) {
 
 /* The section "Render" (scene_render.c). */
 extern const ObjectType scene_render_type;
+/* The section "Sea" (scene_sea.c). */
+extern const ObjectType scene_sea_type;
 
 #endif

@@ -603,6 +603,8 @@ static const Field file_fields[] = {
      .help = "Settings of the simulation"},
     {ROW(FIELD_OBJECT, SceneFile, tank, "Tank"), .flags = FIELD_NULLABLE, .object = &tank_type,
      .help = "The walls around the fluid; absent: none"},
+    {ROW(FIELD_OBJECT, SceneFile, sea, "Sea"), .flags = FIELD_NULLABLE, .object = &scene_sea_type,
+     .help = "A sea without end; absent: the tank is all there is"},
     {ROW(FIELD_LIST, SceneFile, blocks, "FluidBlocks"), .max = 100000, .object = &block_type,
      .help = "The fluid"},
     {ROW(FIELD_LIST, SceneFile, bodies, "RigidBodies"), .max = 10000, .object = &body_type,

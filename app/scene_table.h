@@ -121,12 +121,25 @@ typedef struct SceneRender {
     FieldList bodies;   /* of SceneMaterial */
 } SceneRender;
 
+typedef struct ScenePathPoint {
+    double time, x, z; /* s, m: an entry of SkiffSeaDef.path */
+} ScenePathPoint;
+
+typedef struct SceneSea {
+    float level;
+    const char *follow; /* NULL: absent */
+    FieldList path;     /* of ScenePathPoint */
+    bool absorb;
+    float absorb_min[3], absorb_max[3]; /* NaN: absent */
+} SceneSea;
+
 typedef struct SceneFile {
     const char *schema;
     int version;
     const char *title, *description;
     SceneConfiguration *configuration;
     SceneTank *tank;     /* NULL: absent */
+    SceneSea *sea;       /* NULL: absent */
     FieldList blocks;    /* of SkiffBlockDef */
     FieldList bodies;    /* of SceneBody */
     FieldList probes;    /* of SceneProbe */
