@@ -52,7 +52,7 @@ static bool after_step(Run *run, Err *err) {
         run->next_flush = now + flush_period;
     }
     if (now >= run->next_checkpoint) {
-        if (!run_checkpoint(run, "state.skiff", err))
+        if (!run_checkpoint(run, err))
             return false;
         run->next_checkpoint = progress_clock() + run->args->checkpoint_every;
     }
@@ -83,8 +83,8 @@ static bool step_to_end(Run *run, Err *err) {
 static bool end_diverged(Run *run, Err *err) {
     Err other = {0};
     RunEnd end = {"diverged", err->message};
-    if (!view_finish(run->view, &other) || !run_checkpoint(run, "diverged.skiff", &other) ||
-        !run_close(run, &other) || !run_write_results(run, &end, &other))
+    if (!view_finish(run->view, &other) || !run_keep_diverged(run, &other) || !run_close(run, &other) ||
+        !run_write_results(run, &end, &other))
         err_add(err, ERR_DIVERGED, "%s", other.message);
     else
         err_add(err, ERR_DIVERGED, "the state is in %s/diverged.skiff", run->args->output);
@@ -96,7 +96,7 @@ static bool end_normally(Run *run, Err *err) {
     RunEnd end = {interrupted ? "interrupted" : "finished", ""};
     if (!interrupted)
         pilot_report_left(&run->pilot);
-    if (!view_finish(run->view, err) || !run_checkpoint(run, "state.skiff", err) || !run_close(run, err) ||
+    if (!view_finish(run->view, err) || !run_checkpoint(run, err) || !run_close(run, err) ||
         !run_write_results(run, &end, err))
         return false;
     return !interrupted ||
@@ -109,18 +109,6 @@ static void log_line(LogLevel level, const char *message, void *user) {
     fprintf(stderr, "skiff: %s%s\n", level == LOG_WARNING ? "warning: " : "", message);
 }
 
-/* Cameras that the input file cuts to must exist before hours have been spent. */
-static bool check_cuts(const Run *run, Err *err) {
-    const Script *script = &run->pilot.script;
-    for (size_t i = 0; i < script->count; i++)
-        if (script->events[i].command == SCRIPT_CAMERA &&
-            !view_check_camera(run->view, script->events[i].camera, err)) {
-            err_prefix(err, "%s:%d", run->pilot.file, script->events[i].line);
-            return false;
-        }
-    return true;
-}
-
 static bool make_view(Run *run, Err *err) {
     ViewOptions options;
     if (!view_options_make(&options, run->args, run->scene, err))
@@ -128,9 +116,8 @@ static bool make_view(Run *run, Err *err) {
     if (!view_options_needed(&options))
         return true;
     run->view = view_create(&options, run->scene, run->sim, err);
-    if (!run->view)
-        return err->code != ERR_GL ? false : err_add(err, ERR_GL, "--no-render simulates without pictures");
-    return !options.draws || options.keeps_camera || check_cuts(run, err);
+    return run->view ||
+           (err->code == ERR_GL ? err_add(err, ERR_GL, "--no-render simulates without pictures") : false);
 }
 
 static bool run_scene(Run *run, Err *err) {

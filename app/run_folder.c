@@ -152,10 +152,17 @@ bool run_close(Run *run, Err *err) {
     return pilot_close(&run->pilot, tables ? err : NULL) && tables;
 }
 
-bool run_checkpoint(Run *run, const char *name, Err *err) {
+static bool keep_state(Run *run, const char *name, Err *err) {
     char path[PATH_SIZE];
-    return run_flush(run, true, err) && skiff_save(run->sim, run_path(run, name, path), err) &&
-           view_save(run->view, err);
+    return run_flush(run, true, err) && skiff_save(run->sim, run_path(run, name, path), err);
+}
+
+bool run_checkpoint(Run *run, Err *err) {
+    return keep_state(run, "state.skiff", err) && view_save(run->view, err);
+}
+
+bool run_keep_diverged(Run *run, Err *err) {
+    return keep_state(run, "diverged.skiff", err);
 }
 
 static bool read_tables(const Run *run, ReportInput *input, Err *err) {

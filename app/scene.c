@@ -189,6 +189,10 @@ static void fill_def(Scene *scene) {
     scene->duration = configuration->duration;
     scene->probe_rate = configuration->probe_rate;
     scene->render = file->render;
+    const size_t size = scene_camera_names(file->render, NULL, 0) + 1;
+    char *cameras = pool_alloc(pool, size);
+    scene_camera_names(file->render, cameras, size);
+    scene->cameras = cameras;
 }
 
 /* ---- Reading ---- */

@@ -18,6 +18,7 @@ typedef struct Scene {
     int key_count;
     SkiffDef def;                     /* strings and arrays belong to the scene */
     const struct SceneRender *render; /* NULL: the file has no section "Render" */
+    const char *cameras;              /* names, "a|b|c": those of Render, then those that always exist */
     struct SceneContent *content;
 } Scene;
 

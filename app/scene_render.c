@@ -1,6 +1,8 @@
 /* The section "Render" of a scene file: cameras, materials, and how frames are drawn. */
 #include "scene_rows.h"
 
+#include <stdio.h>
+
 SceneRender scene_render_default(void) {
     return (SceneRender){.fps = 30,
                          .width = 1280,
@@ -182,3 +184,14 @@ const ObjectType scene_render_type = {.help = "How frames are drawn. Present: `s
                                       .init = init_render,
                                       .rules = render_rules,
                                       .rule_count = COUNT(render_rules)};
+
+size_t scene_camera_names(const SceneRender *render, char *out, size_t size) {
+    const FieldList none = {0}, *list = render ? &render->cameras : &none;
+    size_t length = 0;
+    for (int i = 0; i < list->count; i++) {
+        const char *name = ((const SceneCamera *)list->items)[i].name;
+        length += (size_t)snprintf(out ? out + length : NULL, out ? size - length : 0, "%s|", name);
+    }
+    return length +
+           (size_t)snprintf(out ? out + length : NULL, out ? size - length : 0, "%s", RENDER_CAMERAS);
+}

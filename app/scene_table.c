@@ -1,8 +1,10 @@
 /* Every key of a scene file, once. Keys, meanings and units follow SPlisHSPlasH scenes where there is such a
  * thing; keys of Configuration that set the simulation come from the engine's own list (engine/params.inl).
  */
+#include "nearest.h"
 #include "scene_rows.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 static void check_corners(const float min[3], const float max[3], const char *min_key, const char *max_key,
@@ -619,7 +621,32 @@ static const Field file_fields[] = {
      .help = "Frames; absent: none, unless the command line asks for them"},
 };
 
-static const FieldRule file_rules[] = {{"Keys", check_keys}};
+/* Keys can only cut to cameras that there are. */
+static void check_key_cameras(void *object, Problems *problems) {
+    const SceneFile *file = object;
+    const ScriptKey *keys = file->keys.items;
+    const size_t size = scene_camera_names(file->render, NULL, 0) + 1;
+    char *names = malloc(size);
+    if (!names)
+        return problems_add(problems, "not enough memory for the names of the cameras");
+    scene_camera_names(file->render, names, size);
+    for (int i = 0; i < file->keys.count; i++) {
+        if (keys[i].action != SCRIPT_KEY_CAMERA || field_name_index(names, keys[i].camera) >= 0)
+            continue;
+        Nearest nearest = nearest_begin(keys[i].camera);
+        nearest_offer_list(&nearest, names);
+        const char *best = nearest_result(&nearest);
+        const size_t mark = problems_enter(problems, "Keys");
+        problems_enter_index(problems, (size_t)i);
+        problems_enter(problems, "camera");
+        problems_add(problems, "there is no camera %s%s%s%s; there are %s", keys[i].camera,
+                     best ? ", did you mean " : "", best ? best : "", best ? "?" : "", names);
+        problems_leave(problems, mark);
+    }
+    free(names);
+}
+
+static const FieldRule file_rules[] = {{"Keys", check_keys}, {"Keys|Render", check_key_cameras}};
 
 const ObjectType scene_file_type = {.help = "A Skiff scene",
                                     .fields = file_fields,

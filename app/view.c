@@ -256,7 +256,7 @@ static int find_camera(const View *view, const char *name) {
     return -1;
 }
 
-bool view_check_camera(const View *view, const char *name, Err *err) {
+static bool check_camera(const View *view, const char *name, Err *err) {
     if (find_camera(view, name) >= 0)
         return true;
     char list[1024] = "";
@@ -296,7 +296,7 @@ static bool make_cameras(View *view, const SkiffSim *sim, Err *err) {
                         : count > 0              ? given[0].name
                         : view->frame.has_window ? "chase"
                                                  : "fixed";
-    if (!view_check_camera(view, first, err)) {
+    if (!check_camera(view, first, err)) {
         err_prefix(err, "%s", view->options.keeps_camera ? "--camera" : view->scene->file);
         if (view->options.keeps_camera && err)
             err->code = ERR_USAGE;
@@ -332,7 +332,7 @@ static GfxCameraView move_cameras(View *view, const Frame *frame) {
 static bool cut_to_camera(View *view, const char *name, Err *err) {
     if (!*name || view->options.keeps_camera)
         return true;
-    if (!view_check_camera(view, name, err))
+    if (!check_camera(view, name, err))
         return false;
     view->camera = find_camera(view, name);
     return true;

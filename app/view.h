@@ -22,9 +22,6 @@ ViewControls view_controls_none(void);
  * Writes nothing. */
 View *view_create(const ViewOptions *options, const Scene *scene, const SkiffSim *sim, Err *err);
 
-/* ERR_INPUT with the names there are, when there is no such camera. */
-bool view_check_camera(const View *view, const char *name, Err *err);
-
 /* Begins `output`/frames, video.mp4 and particles/, as the options ask, at the time of `sim` (NULL,
  * as `controls`: saved frames follow). Frame 1 is the scene's start. A resumed film begins with the frames
  * that are there already. */

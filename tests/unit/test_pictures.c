@@ -245,8 +245,13 @@ static void input_files_cut_to_cameras(void **unused) {
     expect("run " SMALL " -o top --camera top --size 96x64 --fps 50 --duration 0.042 --hud off -q", 0, "");
     assert_true(same_frame("cut", "uncut", 1) && same_frame("cut", "top", 3));
     assert_false(same_frame("cut", "uncut", 3));
+    assert_true(file_write("at-once.input", "0 camera top\n", 13, NULL));
+    expect("run " SMALL
+           " -o at-once --input at-once.input --size 96x64 --frames 1:1 --duration 0.006 --hud off -q",
+           0, "");
+    assert_true(same_frame("at-once", "top", 1));
     expect("run " SMALL " -o bad --input bad.input --render", 3,
-           "bad.input:2: there is no camera \"mast\"; there are chase,");
+           "bad.input:2: camera: there is no camera mast; there are chase|");
     assert_false(file_exists("bad"));
 }
 
