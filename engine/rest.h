@@ -59,10 +59,11 @@ typedef struct RestCloud {
     Rows rows;
     Boundary boundary; /* the simulation's samples with contacts of the cloud's own */
     Dfsph dfsph;
+    bool fits_walls;     /* the points fit the walls: these make no candidates and remove nothing */
     float counted_below; /* y: candidates above lack neighbours and do not count in the mean density */
-    Buffer marks, laid, source, fate;            /* rest_gather.c */
-    Buffer frozen, held;                         /* [points] 1: gets no row; gets one but does not move */
-    Buffer state, constant, sum, density, order; /* rest_select.c */
+    Buffer marks, laid, source, fate; /* rest_gather.c */
+    Buffer frozen, held;              /* [points] 1: gets no row; gets one but does not move */
+    Buffer state, constant, walls, sum, density, order; /* rest_select.c */
 } RestCloud;
 
 struct SkiffSim;

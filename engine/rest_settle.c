@@ -200,7 +200,7 @@ static void take_over(SkiffSim *sim, double birth, SkiffFill *fill) {
     const Particles *points = &sim->rest.points;
     for (uint32_t i = 0; i < points->count; i++) {
         const RestKind kind = rest_kind(points->id[i]);
-        if (kind == REST_EXISTING)
+        if (kind == REST_EXISTING || kind == REST_EXISTING_RIM)
             continue;
         const uint32_t to =
             particles_append(&sim->particles, points->position[i], (const float[3]){0}, birth);
@@ -283,9 +283,9 @@ void rest_cloud_free(RestCloud *cloud) {
     cloud->boundary.fixed = cloud->boundary.moving = (BoundarySet){0};
     boundary_free(&cloud->boundary);
     dfsph_free(&cloud->dfsph);
-    Buffer *buffers[] = {&cloud->marks,  &cloud->laid,    &cloud->source, &cloud->fate,
-                         &cloud->frozen, &cloud->held,    &cloud->state,  &cloud->constant,
-                         &cloud->sum,    &cloud->density, &cloud->order};
+    Buffer *buffers[] = {&cloud->marks,  &cloud->laid, &cloud->source,  &cloud->fate,
+                         &cloud->frozen, &cloud->held, &cloud->state,   &cloud->constant,
+                         &cloud->walls,  &cloud->sum,  &cloud->density, &cloud->order};
     for (size_t b = 0; b < sizeof buffers / sizeof *buffers; b++)
         buffer_free(buffers[b]);
 }
