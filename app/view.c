@@ -408,7 +408,8 @@ static bool make_meshes(View *view, const SkiffSim *sim, double level, Err *err)
     }
     mesh.triangle_colors = NULL;
     skiff_tank_mesh(sim, &mesh.vertices, &mesh.vertex_count, &mesh.triangles, &mesh.triangle_count);
-    view->has_tank = mesh.triangle_count > 0;
+    /* The walls around a window are none that one could see: the sea goes on behind them. */
+    view->has_tank = mesh.triangle_count > 0 && !view->frame.has_window;
     mesh.material = gfx_material_default(GFX_MATERIAL_TANK);
     return !view->has_tank || add_instance(view, &mesh, err);
 }
