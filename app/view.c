@@ -663,15 +663,16 @@ static const char *memory_path(const View *view, char path[PATH_SIZE]) {
     return path;
 }
 
-static ViewMemory memory_of(const View *view) {
+static ViewMemory memory_of(View *view) {
     return (ViewMemory){.time = view->before_time,
                         .camera = view->camera,
                         .states = (double *)view->states,
                         .state_count = (uint64_t)view->camera_count * CAMERA_SCALARS,
-                        .foam = view->foam};
+                        .foam = view->foam,
+                        .wake = &view->ocean.wake};
 }
 
-bool view_save(const View *view, Err *err) {
+bool view_save(View *view, Err *err) {
     char path[PATH_SIZE];
     if (!view || !view->foam)
         return true;

@@ -30,6 +30,10 @@ void wake_free(Wake *wake) {
     *wake = (Wake){0};
 }
 
+uint64_t wake_count(const Wake *wake) {
+    return wake->amount ? CELLS : 0;
+}
+
 /* The window's middle to the middle of the map. */
 static void move_map(Wake *wake, const Frame *frame) {
     double base[2];

@@ -21,6 +21,9 @@ typedef struct Wake {
 bool wake_make(Wake *wake, float spacing, Err *err);
 void wake_free(Wake *wake);
 
+/* Number of amounts; 0: it was not made. */
+uint64_t wake_count(const Wake *wake);
+
 /* Moves the map on to the frame's time: inside the window (deeper than `margin` m, the map shifted by `shift`
  * m in x, z) it follows the particles, elsewhere it dies away. `foam`: frame->count amounts, foam_update. The
  * result depends on the frames seen and on nothing else. */

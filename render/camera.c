@@ -22,7 +22,7 @@ GfxCameraDef gfx_camera_default(GfxCameraKind kind) {
                         .distance = 7,
                         .height = 2.6,
                         .look_up = 0.3,
-                        .azimuth = -0.55,
+                        .azimuth = 0.55,
                         .smoothing = 0.6,
                         .fov_deg = 45};
     if (kind == GFX_CAMERA_ORBIT) {

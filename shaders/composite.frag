@@ -78,7 +78,7 @@ vec4 see_through(Water water, float ray_length, vec2 bend, float thickness, vec3
 float foam_cover(vec2 p, float amount, float level) {
     float coarse = ripple_layer(2, p, level).z, fine = ripple_layer(3, p, level).w;
     float pattern = 0.58 * coarse + 0.42 * fine;
-    float dense = 1.0 - exp(-1.1 * amount);
+    float dense = 1.0 - exp(-1.3 * amount);
     return clamp(smoothstep(0.85 - dense, 2.0 - 1.2 * dense, pattern + 0.25 * dense) * min(1.0, 4.0 * dense), 0.0, 0.95);
 }
 
