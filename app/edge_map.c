@@ -6,14 +6,19 @@
 #include <stdlib.h>
 
 enum { SIZE_MAX_PER_AXIS = 512 };
-static const float margin = 1.0f; /* m of ocean around the water */
+static const float margin = 1.0f; /* m of ocean around the walls */
 
-static void fit(EdgeMap *map, const Frame *frame) {
+/* By the walls, not by the water, which lies elsewhere where a run is resumed. */
+static void fit(EdgeMap *map, const SkiffSim *sim, const Frame *frame) {
+    const float(*vertices)[3];
+    const uint32_t(*triangles)[3];
+    uint32_t vertex_count, triangle_count;
+    skiff_tank_mesh(sim, &vertices, &vertex_count, &triangles, &triangle_count);
     for (int k = 0; k < 2; k++) {
         float low = INFINITY, high = -INFINITY;
-        for (uint32_t i = 0; i < frame->live; i++) {
-            low = fminf(low, frame->position[i][2 * k]);
-            high = fmaxf(high, frame->position[i][2 * k]);
+        for (uint32_t i = 0; i < vertex_count; i++) {
+            low = fminf(low, vertices[i][2 * k]);
+            high = fmaxf(high, vertices[i][2 * k]);
         }
         map->min[k] = low - margin;
         map->max[k] = high + margin;
@@ -24,9 +29,9 @@ static void fit(EdgeMap *map, const Frame *frame) {
 
 bool edge_map_make(EdgeMap *map, const SkiffSim *sim, const Frame *frame, Err *err) {
     *map = (EdgeMap){0};
-    if (!frame->has_window || frame->live == 0)
+    if (!frame->has_window)
         return true;
-    fit(map, frame);
+    fit(map, sim, frame);
     uint32_t count = map->size[0] * map->size[1];
     float(*points)[4] = calloc(count, sizeof *points);
     map->distance = calloc(count, sizeof *map->distance);

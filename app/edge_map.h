@@ -13,7 +13,7 @@ typedef struct EdgeMap {
     float min[2], max[2];
 } EdgeMap;
 
-/* Around the water of `frame`, which must be the first one: it fills the window. ERR_INPUT when memory is
+/* Of the window of `sim`, at the still surface. `frame` tells where that is. ERR_INPUT when memory is
  * exhausted. */
 bool edge_map_make(EdgeMap *map, const SkiffSim *sim, const Frame *frame, Err *err);
 /* At local x, z, between the samples; beyond them far outside. */

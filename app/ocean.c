@@ -36,7 +36,8 @@ void ocean_free(Ocean *ocean) {
 }
 
 /* Distances (m) from the drawn window's edge between which particles give way. */
-static void find_band(const Ocean *ocean, const SceneRender *render, const Frame *frame, float band[2]) {
+static void find_band(Ocean *ocean, const SceneRender *render, const Frame *frame) {
+    float *band = ocean->band;
     if (!render->fade) { /* the window as it is */
         band[0] = 0;
         band[1] = 0.01f * frame->spacing;
@@ -49,33 +50,11 @@ static void find_band(const Ocean *ocean, const SceneRender *render, const Frame
 void ocean_update(Ocean *ocean, const SceneRender *render, const Frame *frame, const float *foam) {
     if (!ocean->window.distance)
         return;
-    float band[2];
-    find_band(ocean, render, frame, band);
+    find_band(ocean, render, frame);
     for (int k = 0; k < 2; k++)
         ocean->shift[k] =
             render->fade && ocean->follow >= 0
                 ? (float)(frame->bodies[ocean->follow].position[2 * k] - frame->window_centre[2 * k])
                 : 0;
-    wake_update(&ocean->wake, frame, foam, &ocean->window, ocean->shift, band[0]);
-}
-
-GfxOcean ocean_picture(const Ocean *ocean, const SceneRender *render, const Frame *frame) {
-    const EdgeMap *window = &ocean->window;
-    const Wake *wake = &ocean->wake;
-    GfxOcean picture = gfx_scene_default().ocean;
-    picture.enabled = true;
-    picture.ripples = render->ripples;
-    picture.level = (float)(frame->level - frame->origin[1]);
-    picture.edge_distance = window->distance;
-    find_band(ocean, render, frame, picture.blend);
-    picture.foam = wake->amount;
-    for (int k = 0; k < 2; k++) {
-        picture.edge_size[k] = window->size[k];
-        picture.edge_min[k] = window->min[k] + ocean->shift[k];
-        picture.edge_max[k] = window->max[k] + ocean->shift[k];
-        picture.foam_size[k] = WAKE_EDGE;
-        picture.foam_min[k] = (float)(wake->base[k] * (double)wake->cell - frame->origin[2 * k]);
-        picture.foam_max[k] = picture.foam_min[k] + (WAKE_EDGE - 1) * wake->cell;
-    }
-    return picture;
+    wake_update(&ocean->wake, frame, foam, &ocean->window, ocean->shift, ocean->band[0]);
 }

@@ -5,8 +5,6 @@
 #include "scene_table.h"
 #include "wake.h"
 
-#include "render/gfx.h"
-
 /* Zero-initialise, ocean_make, ocean_free. */
 typedef struct Ocean {
     EdgeMap window; /* no distances: there is no window, and no ocean */
@@ -15,6 +13,8 @@ typedef struct Ocean {
     float reach; /* m: how far from the window's middle that body gets before the window moves, and new water
                     takes the place of old */
     float shift[2]; /* m, x and z: from the window's middle to that body */
+    float band[2];  /* m from the edge of the window shifted by that: particles count for nothing nearer to it
+                       than  [0], alone beyond [1] */
 } Ocean;
 
 /* `frame` is the first one. ERR_INPUT when memory is exhausted. */
@@ -23,8 +23,5 @@ void ocean_free(Ocean *ocean);
 
 /* On to the frame's time. `foam`: frame->count amounts, foam_update. */
 void ocean_update(Ocean *ocean, const SceneRender *render, const Frame *frame, const float *foam);
-
-/* Pointers are the ocean's. There must be a window. */
-GfxOcean ocean_picture(const Ocean *ocean, const SceneRender *render, const Frame *frame);
 
 #endif

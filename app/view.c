@@ -430,11 +430,30 @@ static void place_bodies(View *view, const Frame *frame) {
 
 /* ---- The water around ---- */
 
+static GfxOcean sea_around(const Ocean *sea, const Frame *frame, GfxOcean ocean) {
+    const EdgeMap *window = &sea->window;
+    const Wake *wake = &sea->wake;
+    ocean.enabled = true;
+    ocean.level = (float)(frame->level - frame->origin[1]);
+    ocean.edge_distance = window->distance;
+    ocean.foam = wake->amount;
+    memcpy(ocean.blend, sea->band, sizeof ocean.blend);
+    for (int k = 0; k < 2; k++) {
+        ocean.edge_size[k] = window->size[k];
+        ocean.edge_min[k] = window->min[k] + sea->shift[k];
+        ocean.edge_max[k] = window->max[k] + sea->shift[k];
+        ocean.foam_size[k] = WAKE_EDGE;
+        ocean.foam_min[k] = (float)(wake->base[k] * (double)wake->cell - frame->origin[2 * k]);
+        ocean.foam_max[k] = ocean.foam_min[k] + (WAKE_EDGE - 1) * wake->cell;
+    }
+    return ocean;
+}
+
 static GfxOcean ocean_of(const View *view, const Frame *frame) {
-    if (frame->has_window && view->ocean.window.distance)
-        return ocean_picture(&view->ocean, &view->options.render, frame);
     GfxOcean ocean = gfx_scene_default().ocean;
     ocean.ripples = view->options.render.ripples;
+    if (view->ocean.window.distance)
+        return sea_around(&view->ocean, frame, ocean);
     double sum = 0;
     for (uint32_t i = 0; i < frame->live; i++)
         sum += (double)frame->position[i][1];

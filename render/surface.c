@@ -56,23 +56,25 @@ static float fade_of(const GfxParticles *particles, uint32_t i) {
 }
 
 static bool find_bounds(const GfxParticles *particles, float min[3], float max[3], Err *err) {
-    for (int k = 0; k < 3; k++)
-        min[k] = max[k] = particles->position[0][k];
-    for (uint32_t i = 0; i < particles->count; i++)
+    bool some = false;
+    for (uint32_t i = 0; i < particles->count; i++) {
+        bool counts = fade_of(particles, i) > 0.0f, first = counts && !some;
+        some = some || counts;
         for (int k = 0; k < 3; k++) {
             float x = particles->position[i][k];
             if (!isfinite(x))
                 return err_set(err, ERR_USAGE, "particle %u of %u has coordinate %c = %g", i,
                                particles->count, "xyz"[k], (double)x);
-            min[k] = x < min[k] ? x : min[k];
-            max[k] = x > max[k] ? x : max[k];
+            min[k] = first || (counts && x < min[k]) ? x : min[k];
+            max[k] = first || (counts && x > max[k]) ? x : max[k];
         }
+    }
     return true;
 }
 
 static bool make_cells(Cells *cells, Surface *surface, const GfxParticles *particles, float open_part,
                        Err *err) {
-    float min[3], max[3], edge = 2.0f * particles->spacing;
+    float min[3] = {0.0f}, max[3] = {0.0f}, edge = 2.0f * particles->spacing;
     if (!find_bounds(particles, min, max, err))
         return false;
     double total;
@@ -122,10 +124,13 @@ static size_t fine_cell(const Cells *cells, const float p[3]) {
     return (f[2] * 2 * (size_t)cells->size[0] + f[0]) * 2 * (size_t)cells->size[1] + f[1];
 }
 
-/* y runs fastest, so that columns are contiguous. */
+/* y runs fastest, so that columns are contiguous. What is not there counts nowhere. */
 static void count_particles(Cells *cells, const GfxParticles *particles) {
     for (uint32_t i = 0; i < particles->count; i++) {
         const float *p = particles->position[i];
+        cells->cell_of[i] = 0;
+        if (!(fade_of(particles, i) > 0.0f))
+            continue;
         int x = cell_coordinate(cells, p[0], 0), y = cell_coordinate(cells, p[1], 1);
         int column = cell_coordinate(cells, p[2], 2) * cells->size[0] + x;
         int cell = column * cells->size[1] + y;

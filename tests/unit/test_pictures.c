@@ -171,6 +171,32 @@ static void saved_particles_give_the_same_frames(void **unused) {
     expect("render two", 3, "--save-particles FPS");
 }
 
+/* A crate shoved through a window that follows it: foam, the wake behind the window, moves. */
+static void the_same_sea_gives_the_same_frames(void **unused) {
+    (void)unused;
+    static const char scene[] =
+        "{\"version\": 1, \"Configuration\": {\"duration\": 0.5, \"particleRadius\": 0.05, \"timeStepSize\": "
+        "0.005, \"escape\": \"remove\"}, \"Tank\": {\"type\": \"cylinder\", \"radius\": 1, \"height\": 2, "
+        "\"translation\": [0, 1, 0], \"wetHeight\": 1}, \"Sea\": {\"level\": 0.5, \"follow\": \"crate\"}, "
+        "\"RigidBodies\": [{\"name\": \"crate\", \"geometryFile\": \"" SKIFF_SOURCE_DIR
+        "/assets/meshes/crate.obj\", \"scale\": [0.5, 0.5, 0.5], \"mass\": 40, \"translation\": [0, 0.5, 0], "
+        "\"isDynamic\": true, \"velocity\": [3, 0, 0]}], \"Render\": {\"fadeEdge\": 0.1, \"fps\": 20}}";
+    need_gl();
+    assert_true(file_write("sea.json", scene, strlen(scene), NULL));
+    expect("run sea.json -o sea-one --size 160x90 --threads 1 --save-particles 20 -q", 0, "");
+    expect("run sea.json -o sea-two --size 160x90 --threads 2 -q", 0, "");
+    expect("render sea-one --size 160x90 -o sea-again -q", 0, "");
+    expect("run sea.json -o sea-resumed --size 160x90 --fade off --duration 0.28 -q", 0, "");
+    expect("run sea.json -o sea-resumed --size 160x90 --fade off --resume -q", 0, "");
+    expect("render sea-one --size 160x90 -o sea-pops --fade off -q", 0, "");
+    assert_int_equal(count_frames("sea-one"), 11);
+    for (int i = 1; i <= 11; i++)
+        assert_true(same_frame("sea-one", "sea-two", i) && same_frame("sea-one", "sea-again", i));
+    for (int i = 1; i <= 11; i++) /* foam, wake and camera go on; what was fading would be gone */
+        assert_true(same_frame("sea-resumed", "sea-pops", i));
+    assert_false(same_frame("sea-one", "sea-pops", 11));
+}
+
 static void export_needs_no_gl(void **unused) {
     (void)unused;
     expect("run " SMALL " -o plain --duration 0.05 --save-particles 50 --no-render -q", 0, "");
@@ -264,6 +290,7 @@ int main(void) {
         cmocka_unit_test(same_run_same_frames),
         cmocka_unit_test(saved_particles_give_the_same_frames),
         cmocka_unit_test(export_needs_no_gl),
+        cmocka_unit_test(the_same_sea_gives_the_same_frames),
         cmocka_unit_test(a_resumed_run_goes_on_filming),
         cmocka_unit_test(a_scene_can_ask_for_pictures),
         cmocka_unit_test(input_files_cut_to_cameras),
