@@ -61,7 +61,7 @@ PARAM_FLOAT(window_old, "windowOld", 3.0f, 0.0f, 100.0f, "r", "Window: water clo
 PARAM_FLOAT(window_new, "windowNew", 1.5f, 1.0f, 100.0f, "h", "Window: water closer to the new edge is left behind")
 PARAM_FLOAT(window_overlap, "windowOverlap", 2.0f, 0.0f, 4.0f, "r", "Window: new water may come in this deep into the water that stays, where the cut has left gaps; 0 in the authors' code")
 PARAM_FLOAT(window_target, "windowTarget", 0.999f, 0.5f, 1.2f, "density0", "Window: mean density of the candidates at which the selection ends")
-PARAM_INT(window_steps, "windowSteps", 4, 0, 1000, "", "Window: steps of the stabilisation; 10 in the authors' code")
+PARAM_INT(window_steps, "windowSteps", 0, 0, 1000, "", "Window: steps of the stabilisation; 10 in the authors' code")
 PARAM_FLOAT(outflow_distance, "outflowDistance", 3.0f, 0.1f, 1000.0f, "r", "Absorption: water above the still surface and closer to the edge is taken out; 4 in the paper")
 PARAM_FLOAT(inflow_layer, "inflowLayer", 3.0f, 0.1f, 1000.0f, "r", "Absorption: water may come in closer to the edge than this")
 PARAM_FLOAT(inflow_distance, "inflowDistance", 1.75f, 0.1f, 4.0f, "r", "Absorption: where no water and no body is closer than this; 1.2 in the paper")

@@ -31,7 +31,8 @@ enum { REST_SCHEDULE_CONSTANT, REST_SCHEDULE_PRINTED };
 enum { REST_SETTLE_ALL, REST_SETTLE_CANDIDATES };
 
 /* Where water shall be. All of it window-local. */
-typedef enum RestPlace { REST_OUTSIDE, REST_IN_WATER, REST_IN_AIR } RestPlace;
+/* STILL: water that is known to touch nothing it does not fit. */
+typedef enum RestPlace { REST_OUTSIDE, REST_IN_WATER, REST_STILL, REST_IN_AIR } RestPlace;
 
 /* Water at rest that already fits the walls: what a window refills itself from. */
 typedef struct RestFitted {
@@ -76,7 +77,7 @@ void rest_cloud_free(RestCloud *cloud);
 /* The stages of rest_fill. */
 bool rest_gather(struct SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err);
 bool rest_select(struct SkiffSim *sim, SkiffFill *fill, Err *err);
-bool rest_settle(struct SkiffSim *sim, SkiffFill *fill, Err *err);
+bool rest_settle(struct SkiffSim *sim, double birth, SkiffFill *fill, Err *err);
 /* The same for the simulation's particles with ids from `first_id` on; all others are held. */
 bool rest_settle_all(struct SkiffSim *sim, uint64_t first_id, SkiffFill *fill, Err *err);
 /* Sorts the cloud, freezes what is of no kind in `evaluated` (bits 1 << RestKind), and makes rows and

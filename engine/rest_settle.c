@@ -195,11 +195,17 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
     return true;
 }
 
-/* The cloud's new water joins the simulation's. */
-static void take_over(SkiffSim *sim, double birth, SkiffFill *fill) {
-    const Particles *points = &sim->rest.points;
+/* The cloud's new water joins the simulation's; what the stabilisation needs stays in the cloud as well as
+ * `keep` (bits 1 << RestKind) says, and joins later. */
+static void take_over(SkiffSim *sim, uint32_t keep, double birth, SkiffFill *fill) {
+    Particles *points = &sim->rest.points;
+    uint32_t kept = 0, *order = sim->rest.order.data;
     for (uint32_t i = 0; i < points->count; i++) {
         const RestKind kind = rest_kind(points->id[i]);
+        if (keep & 1u << kind) {
+            order[kept++] = i;
+            continue;
+        }
         if (kind == REST_EXISTING || kind == REST_EXISTING_RIM)
             continue;
         const uint32_t to =
@@ -208,13 +214,18 @@ static void take_over(SkiffSim *sim, double birth, SkiffFill *fill) {
         sim->particles.pressure_divergence[to] = points->pressure_divergence[i];
         fill->particles++;
     }
+    if (kept > 0)
+        particles_permute(points, order, kept, sim->threads);
+    points->count = kept;
 }
 
-bool rest_settle(SkiffSim *sim, SkiffFill *fill, Err *err) {
-    if (fill->active == 0)
+bool rest_settle(SkiffSim *sim, double birth, SkiffFill *fill, Err *err) {
+    if (fill->active == 0 || sim->params.rest_steps == 0)
         return true;
     Settle settle = settle_cloud(sim);
     settle.active = fill->active;
+    /* whoever the active can feel is rim: the others need not be sorted in every step */
+    take_over(sim, 1u << REST_ACTIVE | 1u << REST_RIM | 1u << REST_EXISTING_RIM, birth, fill);
     return dfsph_reserve(&sim->rest.dfsph, sim->rest.points.capacity, 1 + (uint32_t)sim->body_count, err) &&
            run_steps(&settle, search_cloud, 0, fill, err);
 }
@@ -263,9 +274,9 @@ bool rest_fill(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *
     const double gathered = timer_ms();
     good = good && rest_select(sim, fill, err);
     const double selected = timer_ms();
-    good = good && (all || rest_settle(sim, fill, err));
+    good = good && (all || rest_settle(sim, request->birth, fill, err));
     if (good)
-        take_over(sim, request->birth, fill);
+        take_over(sim, 0, request->birth, fill);
     good = good && (!all || (request->fitted != NULL && fill->candidates == 0) ||
                     rest_settle_all(sim, first_id, fill, err));
     if (!good)
