@@ -153,6 +153,16 @@ static const Option rest_show_options[] = {
     OPTION_ROW_HELP,
 };
 
+static const Option reproduce_options[] = {
+    {0, "runs", "N", OPTION_INTEGER, AT(runs), .min = 1, .max = 10000,
+     .help = "Fills of each row of table1 and fig2, each with another offset (default 51, as the paper)"},
+    {'o', "output", "DIR", OPTION_TEXT, AT(output), .help = "Folder for report.html and the CSV files"},
+    {0, "json", NULL, OPTION_FLAG, AT(json), .help = "One line of JSON for each row in place of the tables"},
+    OPTION_ROWS_ENGINE,
+    {'q', "quiet", NULL, OPTION_FLAG, AT(quiet), .help = "No progress on stderr"},
+    OPTION_ROW_HELP,
+};
+
 static const Command commands[] = {
     {"run", "scene", true, "SCENE -o DIR", "Simulate a scene and write its results into a folder",
      "The folder receives report.html (charts; open it in a browser), summary.json, steps.csv, ledger.csv\n"
@@ -210,6 +220,18 @@ static const Command commands[] = {
      "  skiff rest show\n"
      "  skiff rest show block.skiff --json\n",
      rest_show_options, COUNT(rest_show_options), rest_show_command},
+    {"reproduce carensac2023", "experiment", false, "[EXPERIMENT]",
+     "Run the experiments of a paper and set our figures beside its own",
+     "Fluid initialization and dynamic window for SPH simulation (Carensac, Pronost, Bouakaz 2023):\n"
+     "  table1   four fills with water at rest: counts, times, iterations, speeds afterwards\n"
+     "  fig2     rules of the selection, over their parameters\n"
+     "  fig4c    a floating cube for 3 s after a fill\n"
+     "  all      all of these (default)\n"
+     "Rows with the paper's name follow its method; those named \"defaults\" are what this program does by\n"
+     "itself.\n",
+     "  skiff reproduce carensac2023 table1 --runs 5\n"
+     "  skiff reproduce carensac2023 all -o out/carensac2023\n",
+     reproduce_options, COUNT(reproduce_options), reproduce_carensac_command},
 };
 
 /* ---- Help ---- */
@@ -431,6 +453,7 @@ static CliArgs default_args(void) {
                      .settle = 1.2,
                      .steps = 20,
                      .windows = 5,
+                     .runs = 51,
                      .edge = 12,
                      .seed = 1,
                      .min = {NAN, NAN, NAN},

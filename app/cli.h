@@ -26,6 +26,7 @@ typedef struct CliArgs {
     double edge;         /* rest make, d */
     int seed;
     double min[3], max[3]; /* rest cut, m; NaN: not given */
+    int runs;              /* reproduce */
     bool help;
 } CliArgs;
 

@@ -211,6 +211,9 @@ void skiff_destroy(SkiffSim *sim);
  * which the fault was found. */
 bool skiff_step(SkiffSim *sim, Err *err);
 
+/* Fills a block with water at rest now, whatever its `fill`, `time` and `repeat` say. False: as rest fills at
+ * the start, and the simulation is as it was. */
+bool skiff_fill_block(SkiffSim *sim, const SkiffBlockDef *block, Err *err);
 /* Takes away the fluid particles inside [min, max) (m, world); the others stay as they are. ERR_INPUT: no
  * memory, and nothing is removed. */
 bool skiff_remove_box(SkiffSim *sim, const double min[3], const double max[3], uint32_t *removed, Err *err);
