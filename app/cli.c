@@ -5,6 +5,8 @@
 #include "commands.h"
 #include "nearest.h"
 #include "problems.h"
+#include "scene_table.h"
+#include "view_options.h"
 #include "version.h"
 
 #include <errno.h>
@@ -78,6 +80,67 @@ typedef struct Command {
 #define OPTION_ROW_HELP                                                                                      \
     { 'h', "help", NULL, OPTION_FLAG, AT(help), .help = "Show this help" }
 
+/* Of pictures; words in the order of the enumerations. */
+#define PICTURE(member) .offset = offsetof(CliArgs, pictures.member)
+#define OPTION_ROW_GL                                                                                        \
+    {                                                                                                        \
+        0, "gl", "WAY", OPTION_CHOICE, PICTURE(gl),                                                          \
+            .names = VIEW_BACKENDS,                                                                          \
+            .help = "How OpenGL is reached without a screen: " VIEW_BACKENDS " (default auto: the first "    \
+                    "that works)"                                                                            \
+    }
+#define OPTION_ROWS_PICTURES                                                                                 \
+    {                                                                                                        \
+        0,           "video",        NULL,                                                                   \
+        OPTION_FLAG, PICTURE(video), .help = "Film the frames: video.mp4 (H.264), by ffmpeg"},               \
+        {0, "size", "WxH", OPTION_TEXT, PICTURE(size), .help = "Size of a frame, px (default 1280x720)"},    \
+        {0,                                                                                                  \
+         "supersample",                                                                                      \
+         "N",                                                                                                \
+         OPTION_INTEGER,                                                                                     \
+         PICTURE(supersample),                                                                               \
+         .min = 1,                                                                                           \
+         .max = 4,                                                                                           \
+         .help = "Draw N times larger, then average; for stills"},                                           \
+        {0,                                                                                                  \
+         "look",                                                                                             \
+         "LOOK",                                                                                             \
+         OPTION_CHOICE,                                                                                      \
+         PICTURE(look),                                                                                      \
+         .names = RENDER_LOOKS,                                                                              \
+         .help = RENDER_LOOKS ": a surface, or spheres coloured by a field"},                                \
+        {0,                                                                                                  \
+         "field",                                                                                            \
+         "FIELD",                                                                                            \
+         OPTION_CHOICE,                                                                                      \
+         PICTURE(field),                                                                                     \
+         .names = RENDER_FIELDS,                                                                             \
+         .help = "Colour of the look particles: " RENDER_FIELDS},                                            \
+        {0,                                                                                                  \
+         "camera",                                                                                           \
+         "NAME",                                                                                             \
+         OPTION_TEXT,                                                                                        \
+         PICTURE(camera),                                                                                    \
+         .help = "One of the scene's cameras, or chase, fixed, orbit, top, bow; cuts of the input script "   \
+                 "are not followed then"},                                                                   \
+        {0,                                                                                                  \
+         "hud",                                                                                              \
+         "WHICH",                                                                                            \
+         OPTION_CHOICE,                                                                                      \
+         PICTURE(hud),                                                                                       \
+         .names = RENDER_HUDS,                                                                               \
+         .help = "Figures in the picture: " RENDER_HUDS "; timing adds the wall time of a step, which "      \
+                 "makes the frames of two runs differ"},                                                     \
+        {0,                                                                                                  \
+         "fade",                                                                                             \
+         "WHICH",                                                                                            \
+         OPTION_CHOICE,                                                                                      \
+         PICTURE(fade),                                                                                      \
+         .names = "off|on",                                                                                  \
+         .help = "on (default): created and removed particles fade; off: they pop"},                         \
+        {0, "frames", "A:B", OPTION_TEXT, PICTURE(frames), .help = "Draw only frames A to B, from 1"},       \
+        OPTION_ROW_GL
+
 static const Option run_options[] = {
     {'o', "output", "DIR", OPTION_TEXT, AT(output), .help = "Folder for the results, created; required"},
     OPTION_ROW_INPUT,
@@ -89,6 +152,15 @@ static const Option run_options[] = {
     {'r', "resume", NULL, OPTION_FLAG, AT(resume), .help = "Go on from the folder's last checkpoint"},
     {0, "checkpoint-every", "S", OPTION_NUMBER, AT(checkpoint_every), .min = 0, .max = 1e9,
      .help = "Wall-clock seconds between checkpoints (default 120; 0: after every step)"},
+    {0, "render", NULL, OPTION_FLAG, PICTURE(render),
+     .help = "Draw frames/frame_000001.png ... (default when the scene has a section \"Render\", or when one "
+             "of the options below is given)"},
+    {0, "no-render", NULL, OPTION_FLAG, PICTURE(no_render), .help = "Draw none; needs no OpenGL"},
+    {0, "fps", "N", OPTION_INTEGER, PICTURE(fps), .min = 1, .max = 1000,
+     .help = "Frames a simulated second (default 30); the step need not fit"},
+    OPTION_ROWS_PICTURES,
+    {0, "save-particles", "FPS", OPTION_INTEGER, PICTURE(save_particles), .min = 1, .max = 1000,
+     .help = "Save particles/ as often, 52 bytes a particle, for `skiff render` and export"},
     {'q', "quiet", NULL, OPTION_FLAG, AT(quiet), .help = "No progress on stderr"},
     OPTION_ROW_HELP,
 };
@@ -163,17 +235,35 @@ static const Option reproduce_options[] = {
     OPTION_ROW_HELP,
 };
 
+static const Option render_options[] = {
+    {'o', "output", "OUT", OPTION_TEXT, AT(output),
+     .help = "Folder for the results (default DIR/redrawn, or DIR/export)"},
+    {'f', "force", NULL, OPTION_FLAG, AT(force), .help = "Replace the results in an existing folder"},
+    OPTION_ROWS_PICTURES,
+    {0, "export", "FORMAT", OPTION_CHOICE, PICTURE(export), .names = VIEW_EXPORTS,
+     .help = "Convert the particles instead of drawing them: vtk (.vtu: ParaView, Blender), ply, bgeo "
+             "(Houdini)"},
+    {'q', "quiet", NULL, OPTION_FLAG, AT(quiet), .help = "No progress on stderr"},
+    OPTION_ROW_HELP,
+};
+
+static const Option gl_info_options[] = {
+    OPTION_ROW_GL,
+    OPTION_ROW_HELP,
+};
+
 static const Command commands[] = {
     {"run", "scene", true, "SCENE -o DIR", "Simulate a scene and write its results into a folder",
      "The folder receives report.html (charts; open it in a browser), summary.json, steps.csv, ledger.csv\n"
      "(particles in and out by cause), hull.csv (bodies), probes.csv, trace.json (opens in Perfetto),\n"
      "scene.json (the scene with every default filled in), run.input (what was driven; --input replays it)\n"
-     "and state.skiff (checkpoint).\n"
+     "and state.skiff (checkpoint); with pictures also frames/ and video.mp4.\n"
      "Ctrl-C finishes the step, writes a checkpoint and the report, and exits with 130; --resume goes on "
      "from there.\n",
      "  skiff run assets/scenes/settling-tank.json -o out/tank\n"
      "  skiff run assets/scenes/dam-body.json -o out/dam --duration 2 --set RigidBodies[0].density=300\n"
-     "  skiff run assets/scenes/dam-body.json -o out/dam --resume --duration 4\n",
+     "  skiff run assets/scenes/dam-body.json -o out/dam --resume --duration 4\n"
+     "  skiff run assets/scenes/dam-body.json -o out/film --video --size 960x540 --camera orbit\n",
      run_options, COUNT(run_options), run_command},
     {"check", "scene", true, "SCENE", "Check a scene and show what it means",
      "Reports every problem of the file, with its place, the values allowed and the nearest name. A good\n"
@@ -232,6 +322,19 @@ static const Command commands[] = {
      "  skiff reproduce carensac2023 table1 --runs 5\n"
      "  skiff reproduce carensac2023 all -o out/carensac2023\n",
      reproduce_options, COUNT(reproduce_options), reproduce_carensac_command},
+    {"render", "folder of a run", true, "DIR", "Draw a finished run again, or export its particles",
+     "Reads what `skiff run --save-particles FPS -o DIR` left in DIR: a frame for each saved moment, with\n"
+     "another look, camera or size. --export needs no OpenGL.\n",
+     "  skiff run assets/scenes/dam-body.json -o out/dam --save-particles 30\n"
+     "  skiff render out/dam --look particles --field pressure --camera top --video\n"
+     "  skiff render out/dam --export vtk -o out/vtk\n",
+     render_options, COUNT(render_options), render_command},
+    {"gl-info", NULL, false, "", "Show how OpenGL is reached and who draws",
+     "Tries the ways to draw without a screen and prints vendor, renderer and version of the one that is\n"
+     "used. Exit code 4 where none works, with the packages to install.\n",
+     "  skiff gl-info\n"
+     "  skiff gl-info --gl osmesa\n",
+     gl_info_options, COUNT(gl_info_options), gl_info_command},
 };
 
 /* ---- Help ---- */
@@ -267,14 +370,15 @@ static void print_main_help(void) {
         print_usage(&commands[i]);
     printf("  %-28s %s\n", "skiff help [COMMAND]", "Show help, with every option of a command");
     printf("  %-28s %s\n", "skiff --version", "Show version, commit and compiler");
-    fputs("\nScenes are JSON files; assets/scenes has examples and `skiff check --schema` lists every key.\n"
-          "\nExamples:\n"
-          "  skiff run assets/scenes/settling-tank.json -o out/tank     then open out/tank/report.html\n"
-          "  skiff check assets/scenes/floating-box.json\n"
-          "  skiff bench assets/scenes/bench-tank.json --json\n"
-          "\nExit codes: 0 ok, 2 usage, 3 bad input, 5 diverged, 6 reading or writing failed, 130 "
-          "interrupted.\n",
-          stdout);
+    fputs(
+        "\nScenes are JSON files; assets/scenes has examples and `skiff check --schema` lists every key.\n"
+        "\nExamples:\n"
+        "  skiff run assets/scenes/settling-tank.json -o out/tank     then open out/tank/report.html\n"
+        "  skiff check assets/scenes/floating-box.json\n"
+        "  skiff bench assets/scenes/bench-tank.json --json\n"
+        "\nExit codes: 0 ok, 2 usage, 3 bad input, 4 no OpenGL, 5 diverged, 6 reading or writing failed, 130 "
+        "interrupted.\n",
+        stdout);
 }
 
 static void print_command_help(const Command *command) {
@@ -457,7 +561,8 @@ static CliArgs default_args(void) {
                      .edge = 12,
                      .seed = 1,
                      .min = {NAN, NAN, NAN},
-                     .max = {NAN, NAN, NAN}};
+                     .max = {NAN, NAN, NAN},
+                     .pictures = {.look = -1, .field = -1, .hud = -1, .fade = -1, .gl = -1, .export = -1}};
 }
 
 /* ---- Running ---- */

@@ -2,9 +2,17 @@
 #ifndef SKIFF_APP_CLI_H
 #define SKIFF_APP_CLI_H
 
-#include "engine/skiff.h"
+#include "engine/base/err.h"
 
 enum { CLI_MAX_EDITS = 64 };
+
+/* What it said about pictures. -1, 0 and NULL: nothing. */
+typedef struct CliPictures {
+    bool render, no_render, video;
+    int look, field, hud, fade, gl, export; /* position in the option's list of words */
+    int fps, supersample, save_particles;
+    const char *size, *camera, *frames;
+} CliPictures;
 
 /* What the command line said. Options that a command does not have keep their defaults. */
 typedef struct CliArgs {
@@ -23,7 +31,8 @@ typedef struct CliArgs {
     int steps, windows;
     bool json, no_results;
     const char *results; /* NULL: the source tree's */
-    double edge;         /* rest make, d */
+    CliPictures pictures;
+    double edge; /* rest make, d */
     int seed;
     double min[3], max[3]; /* rest cut, m; NaN: not given */
     int runs;              /* reproduce */

@@ -8,6 +8,8 @@
 bool run_command(const CliArgs *args, Err *err);
 bool check_command(const CliArgs *args, Err *err);
 bool bench_command(const CliArgs *args, Err *err);
+bool render_command(const CliArgs *args, Err *err);
+bool gl_info_command(const CliArgs *args, Err *err);
 bool profile_command(const CliArgs *args, Err *err);
 bool rest_make_command(const CliArgs *args, Err *err);
 bool rest_cut_command(const CliArgs *args, Err *err);

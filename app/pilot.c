@@ -6,6 +6,7 @@
 #include "engine/base/file.h"
 #include "engine/base/log.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -18,7 +19,7 @@ static void join(char path[4096], const char *folder, const char *name) {
 }
 
 static ScriptWords words_of(const Scene *scene) {
-    return (ScriptWords){.keys = scene->keys, .key_count = scene->key_count};
+    return (ScriptWords){.keys = scene->keys, .key_count = scene->key_count, .cameras = scene->cameras};
 }
 
 static bool read_script(const char *path, const Scene *scene, char **text, size_t *size, Script *script,
@@ -146,4 +147,26 @@ void pilot_free(Pilot *pilot) {
     free(pilot->text);
     script_free(&pilot->script);
     *pilot = (Pilot){0};
+}
+
+/* ---- For pictures ---- */
+
+void pilot_show(const Pilot *pilot, const SkiffSim *sim, FrameControls *controls) {
+    Helm helm = pilot->helm;
+    helm_advance(&helm, &pilot->script, skiff_time(sim));
+    const HelmPosition position = helm_position(&helm);
+    size_t used = 0;
+    *controls = (FrameControls){.throttle = NAN, .rudder = NAN, .has_keys = pilot->text != NULL};
+    if (skiff_drive_count(sim) > 0) {
+        controls->throttle = position.throttle;
+        controls->rudder = position.hold ? skiff_drive(sim, 0).rudder : position.rudder;
+    }
+    for (int k = 0; k < helm.key_count; k++) {
+        const size_t length = strlen(helm.keys[k].key);
+        if (!helm.held[k] || used + length + 2 > sizeof controls->keys)
+            continue; /* hands hold few keys: more than the picture has room for are not shown */
+        used += (size_t)snprintf(controls->keys + used, sizeof controls->keys - used, "%s%s",
+                                 used > 0 ? " " : "", helm.keys[k].key);
+    }
+    snprintf(controls->camera, sizeof controls->camera, "%s", position.camera);
 }

@@ -3,6 +3,7 @@
 #define SKIFF_APP_PILOT_H
 
 #include "csv.h"
+#include "frames.h"
 #include "helm.h"
 #include "scene.h"
 
@@ -22,6 +23,9 @@ typedef struct Pilot {
 bool pilot_read(Pilot *pilot, const Scene *scene, const char *file, const char *folder, Err *err);
 /* Before each step. */
 bool pilot_step(Pilot *pilot, SkiffSim *sim, Err *err);
+/* What is being driven now, for a picture: events of this moment count, though no step has seen them yet, so
+ * that frame 1 has the camera of the frames after it. */
+void pilot_show(const Pilot *pilot, const SkiffSim *sim, FrameControls *controls);
 void pilot_free(Pilot *pilot);
 /* ---- Only where a folder keeps what was driven; a pilot without one drives all the same. ---- */
 

@@ -32,8 +32,18 @@ static Scene *load_scene(const CliArgs *args, Err *err) {
 
 /* ---- The game loop ---- */
 
+static bool draw_frames(Run *run, Err *err) {
+    ViewControls controls = view_controls_none();
+    controls.step_ms = skiff_stats(run->sim)->step_ms;
+    if (run->view)
+        pilot_show(&run->pilot, run->sim, &controls.driven);
+    return !run->view || view_step(run->view, run->sim, &controls, err);
+}
+
 static bool after_step(Run *run, Err *err) {
     tables_add(&run->tables, run->sim);
+    if (!draw_frames(run, err))
+        return false;
     progress_step(&run->progress, run->sim);
     double now = run->progress.last;
     if (now >= run->next_flush) {
@@ -42,7 +52,7 @@ static bool after_step(Run *run, Err *err) {
         run->next_flush = now + flush_period;
     }
     if (now >= run->next_checkpoint) {
-        if (!run_checkpoint(run, "state.skiff", err))
+        if (!run_checkpoint(run, err))
             return false;
         run->next_checkpoint = progress_clock() + run->args->checkpoint_every;
     }
@@ -73,7 +83,7 @@ static bool step_to_end(Run *run, Err *err) {
 static bool end_diverged(Run *run, Err *err) {
     Err other = {0};
     RunEnd end = {"diverged", err->message};
-    if (!run_checkpoint(run, "diverged.skiff", &other) || !run_close(run, &other) ||
+    if (!view_finish(run->view, &other) || !run_keep_diverged(run, &other) || !run_close(run, &other) ||
         !run_write_results(run, &end, &other))
         err_add(err, ERR_DIVERGED, "%s", other.message);
     else
@@ -86,7 +96,7 @@ static bool end_normally(Run *run, Err *err) {
     RunEnd end = {interrupted ? "interrupted" : "finished", ""};
     if (!interrupted)
         pilot_report_left(&run->pilot);
-    if (!run_checkpoint(run, "state.skiff", err) || !run_close(run, err) ||
+    if (!view_finish(run->view, err) || !run_checkpoint(run, err) || !run_close(run, err) ||
         !run_write_results(run, &end, err))
         return false;
     return !interrupted ||
@@ -97,6 +107,17 @@ static bool end_normally(Run *run, Err *err) {
 static void log_line(LogLevel level, const char *message, void *user) {
     progress_clear(user);
     fprintf(stderr, "skiff: %s%s\n", level == LOG_WARNING ? "warning: " : "", message);
+}
+
+static bool make_view(Run *run, Err *err) {
+    ViewOptions options;
+    if (!view_options_make(&options, run->args, run->scene, err))
+        return false;
+    if (!view_options_needed(&options))
+        return true;
+    run->view = view_create(&options, run->scene, run->sim, err);
+    return run->view ||
+           (err->code == ERR_GL ? err_add(err, ERR_GL, "--no-render simulates without pictures") : false);
 }
 
 static bool run_scene(Run *run, Err *err) {
@@ -112,6 +133,8 @@ static bool run_scene(Run *run, Err *err) {
     if (interrupt_pending())
         return err_set(err, ERR_INTERRUPTED,
                        "skiff run: interrupted before the first step; nothing was written");
+    if (!make_view(run, err))
+        return false;
     run->end_time = run->scene->def.start_time + run->scene->duration;
     if (!run_begin(run, err))
         return false;
@@ -128,6 +151,7 @@ bool run_command(const CliArgs *args, Err *err) {
     log_set_sink(NULL, NULL, LOG_WARNING);
     run_close(&run, NULL);
     pilot_free(&run.pilot);
+    view_destroy(run.view);
     skiff_destroy(run.sim);
     scene_free(run.scene);
     return ok;

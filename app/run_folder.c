@@ -72,13 +72,14 @@ static bool find_difference(const json_t *a, const json_t *b, char *path, size_t
     return true;
 }
 
-/* What a resumed run may change: how long it is and how it is called. */
+/* What a resumed run may change: how long it is, how it is called and how it is drawn. */
 static json_t *comparable(const Scene *scene) {
     json_t *effective = scene_effective(scene);
     json_object_del(json_object_get(effective, "Configuration"), "duration");
     json_object_del(effective, "title");
     json_object_del(effective, "description");
     json_object_del(effective, "$schema");
+    json_object_del(effective, "Render");
     json_object_del(effective, "input"); /* the folder has its own copy */
     return effective;
 }
@@ -117,7 +118,7 @@ static bool remove_old(const Run *run, Err *err) {
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         if (unlink(run_path(run, names[i], path)) != 0 && errno != ENOENT)
             return err_set(err, ERR_IO, "%s: cannot be replaced: %s", path, strerror(errno));
-    return true;
+    return frames_remove(run->args->output, err);
 }
 
 bool run_begin(Run *run, Err *err) {
@@ -135,7 +136,9 @@ bool run_begin(Run *run, Err *err) {
     json_t *effective = scene_effective(run->scene);
     bool written = json_text_write(run_path(run, "scene.json", path), effective, err);
     json_decref(effective);
-    return written;
+    ViewControls controls = view_controls_none();
+    pilot_show(&run->pilot, run->sim, &controls.driven);
+    return written && (!run->view || view_begin(run->view, run->sim, &controls, args->output, err));
 }
 
 /* ---- During and after ---- */
@@ -149,9 +152,17 @@ bool run_close(Run *run, Err *err) {
     return pilot_close(&run->pilot, tables ? err : NULL) && tables;
 }
 
-bool run_checkpoint(Run *run, const char *name, Err *err) {
+static bool keep_state(Run *run, const char *name, Err *err) {
     char path[PATH_SIZE];
     return run_flush(run, true, err) && skiff_save(run->sim, run_path(run, name, path), err);
+}
+
+bool run_checkpoint(Run *run, Err *err) {
+    return keep_state(run, "state.skiff", err) && view_save(run->view, err);
+}
+
+bool run_keep_diverged(Run *run, Err *err) {
+    return keep_state(run, "diverged.skiff", err);
 }
 
 static bool read_tables(const Run *run, ReportInput *input, Err *err) {

@@ -8,6 +8,7 @@
 #include "scene.h"
 #include "summary.h"
 #include "tables.h"
+#include "view.h"
 
 typedef struct Run {
     const CliArgs *args;
@@ -15,6 +16,7 @@ typedef struct Run {
     SkiffSim *sim;
     Pilot pilot;
     Tables tables;
+    View *view; /* NULL: no pictures */
     Progress progress;
     double end_time;                    /* s, simulated */
     double next_flush, next_checkpoint; /* s, wall clock */
@@ -26,8 +28,10 @@ bool run_check_args(const CliArgs *args, Err *err);
 bool run_begin(Run *run, Err *err);
 /* Gives all rows to the operating system, and to the disk if `durable`. */
 bool run_flush(Run *run, bool durable, Err *err);
-/* Rows first, then the state under this name. */
-bool run_checkpoint(Run *run, const char *name, Err *err);
+/* Rows first, then the state and what the next frames depend on: what --resume goes on from. */
+bool run_checkpoint(Run *run, Err *err);
+/* Rows first, then the state of a run that cannot go on, as diverged.skiff. */
+bool run_keep_diverged(Run *run, Err *err);
 bool run_close(Run *run, Err *err);
 /* summary.json, trace.json and report.html from the closed tables; prints the end. */
 bool run_write_results(Run *run, const RunEnd *end, Err *err);

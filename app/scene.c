@@ -1,7 +1,7 @@
 /* From a scene file to a SkiffDef: JSON -> edits of the command line -> tables (scene_table.c) -> def. */
 #include "scene.h"
 
-#include "scene_table.h"
+#include "scene_rows.h"
 
 #include "engine/base/file.h"
 
@@ -124,6 +124,35 @@ static SkiffProbeDef probe_def(const SceneProbe *probe) {
     return def;
 }
 
+/* Where water at rest is kept between runs: $SKIFF_CACHE, else the user's cache; NULL: nowhere. */
+static const char *cache_folder(Pool *pool) {
+    const char *own = getenv("SKIFF_CACHE"), *cache = getenv("XDG_CACHE_HOME"), *home = getenv("HOME");
+    if (own)
+        return *own ? own : NULL;
+    if (!(cache && *cache) && !(home && *home))
+        return NULL;
+    const bool user = cache && *cache;
+    const char *base = user ? cache : home, *rest = user ? "/skiff" : "/.cache/skiff";
+    char *folder = pool_alloc(pool, strlen(base) + strlen(rest) + 1);
+    strcpy(folder, base);
+    return strcat(folder, rest);
+}
+
+static SkiffSeaDef sea_def(const SceneSea *sea, Pool *pool) {
+    SkiffSeaDef def = {.on = true,
+                       .level = sea->level,
+                       .follow = sea->follow,
+                       .path_count = sea->path.count,
+                       .absorb = sea->absorb,
+                       .has_region = is_given(sea->absorb_min),
+                       .cache = cache_folder(pool)};
+    _Static_assert(sizeof(ScenePathPoint) == sizeof(double[3]), "a point of the path is three numbers");
+    def.path = sea->path.items;
+    memcpy(def.region_min, sea->absorb_min, sizeof def.region_min);
+    memcpy(def.region_max, sea->absorb_max, sizeof def.region_max);
+    return def;
+}
+
 static void fill_def(Scene *scene) {
     Pool *pool = &scene->content->pool;
     const SceneFile *file = &scene->content->file;
@@ -139,6 +168,8 @@ static void fill_def(Scene *scene) {
     }
     if (file->tank)
         def->tank = tank_def(file->tank, pool);
+    if (file->sea)
+        def->sea = sea_def(file->sea, pool);
     SkiffBodyDef *bodies = pool_alloc(pool, (size_t)file->bodies.count * sizeof *bodies);
     for (int i = 0; i < file->bodies.count; i++)
         bodies[i] = body_def((const SceneBody *)file->bodies.items + i);
@@ -157,6 +188,11 @@ static void fill_def(Scene *scene) {
     scene->key_count = file->keys.count;
     scene->duration = configuration->duration;
     scene->probe_rate = configuration->probe_rate;
+    scene->render = file->render;
+    const size_t size = scene_camera_names(file->render, NULL, 0) + 1;
+    char *cameras = pool_alloc(pool, size);
+    scene_camera_names(file->render, cameras, size);
+    scene->cameras = cameras;
 }
 
 /* ---- Reading ---- */

@@ -16,7 +16,9 @@ typedef struct Scene {
     const char *input; /* input file, as a path that can be opened; NULL: none */
     const ScriptKey *keys;
     int key_count;
-    SkiffDef def; /* strings and arrays belong to the scene */
+    SkiffDef def;                     /* strings and arrays belong to the scene */
+    const struct SceneRender *render; /* NULL: the file has no section "Render" */
+    const char *cameras;              /* names, "a|b|c": those of Render, then those that always exist */
     struct SceneContent *content;
 } Scene;
 

@@ -1,26 +1,11 @@
 /* Every key of a scene file, once. Keys, meanings and units follow SPlisHSPlasH scenes where there is such a
  * thing; keys of Configuration that set the simulation come from the engine's own list (engine/params.inl).
  */
-#include "scene_table.h"
+#include "nearest.h"
+#include "scene_rows.h"
 
-#include <math.h>
+#include <stdlib.h>
 #include <string.h>
-
-#define COUNT(table) ((int)(sizeof(table) / sizeof *(table)))
-#define COORDINATE   .min = -1e5, .max = 1e5, .unit = "m"
-#define LENGTH       .min = 1e-4, .max = 1e5, .unit = "m"
-#define SPEED        .min = -1e4, .max = 1e4, .unit = "m/s"
-#define DURATION     .min = 0, .max = 1e6, .unit = "s"
-
-static void set3(float out[3], float x, float y, float z) {
-    out[0] = x;
-    out[1] = y;
-    out[2] = z;
-}
-
-static bool is_given(const float vector[3]) {
-    return !isnan(vector[0]);
-}
 
 static void check_corners(const float min[3], const float max[3], const char *min_key, const char *max_key,
                           Problems *problems) {
@@ -77,9 +62,6 @@ static bool param_row(int index, Field *field) {
         *field = info_row(&infos[index], offsetof(SceneConfiguration, params));
     return index < count;
 }
-
-#define ROW(field_type, struct_type, member, json_key)                                                       \
-    .key = json_key, .type = field_type, .offset = offsetof(struct_type, member)
 
 static const Field configuration_fields[] = {
     {ROW(FIELD_DOUBLE, SceneConfiguration, duration, "duration"), .min = 1e-6, .max = 1e6, .unit = "s",
@@ -623,6 +605,8 @@ static const Field file_fields[] = {
      .help = "Settings of the simulation"},
     {ROW(FIELD_OBJECT, SceneFile, tank, "Tank"), .flags = FIELD_NULLABLE, .object = &tank_type,
      .help = "The walls around the fluid; absent: none"},
+    {ROW(FIELD_OBJECT, SceneFile, sea, "Sea"), .flags = FIELD_NULLABLE, .object = &scene_sea_type,
+     .help = "A sea without end; absent: the tank is all there is"},
     {ROW(FIELD_LIST, SceneFile, blocks, "FluidBlocks"), .max = 100000, .object = &block_type,
      .help = "The fluid"},
     {ROW(FIELD_LIST, SceneFile, bodies, "RigidBodies"), .max = 10000, .object = &body_type,
@@ -633,9 +617,36 @@ static const Field file_fields[] = {
      .help = "Input file that drives, relative to the scene; `skiff run --input` takes its place"},
     {ROW(FIELD_LIST, SceneFile, keys, "Keys"), .max = SCRIPT_MAX_KEYS, .object = &key_type,
      .help = "Keys that input files can press; absent: w s a d, z q and the arrows"},
+    {ROW(FIELD_OBJECT, SceneFile, render, "Render"), .flags = FIELD_NULLABLE, .object = &scene_render_type,
+     .help = "Frames; absent: none, unless the command line asks for them"},
 };
 
-static const FieldRule file_rules[] = {{"Keys", check_keys}};
+/* Keys can only cut to cameras that there are. */
+static void check_key_cameras(void *object, Problems *problems) {
+    const SceneFile *file = object;
+    const ScriptKey *keys = file->keys.items;
+    const size_t size = scene_camera_names(file->render, NULL, 0) + 1;
+    char *names = malloc(size);
+    if (!names)
+        return problems_add(problems, "not enough memory for the names of the cameras");
+    scene_camera_names(file->render, names, size);
+    for (int i = 0; i < file->keys.count; i++) {
+        if (keys[i].action != SCRIPT_KEY_CAMERA || field_name_index(names, keys[i].camera) >= 0)
+            continue;
+        Nearest nearest = nearest_begin(keys[i].camera);
+        nearest_offer_list(&nearest, names);
+        const char *best = nearest_result(&nearest);
+        const size_t mark = problems_enter(problems, "Keys");
+        problems_enter_index(problems, (size_t)i);
+        problems_enter(problems, "camera");
+        problems_add(problems, "there is no camera %s%s%s%s; there are %s", keys[i].camera,
+                     best ? ", did you mean " : "", best ? best : "", best ? "?" : "", names);
+        problems_leave(problems, mark);
+    }
+    free(names);
+}
+
+static const FieldRule file_rules[] = {{"Keys", check_keys}, {"Keys|Render", check_key_cameras}};
 
 const ObjectType scene_file_type = {.help = "A Skiff scene",
                                     .fields = file_fields,

@@ -72,19 +72,91 @@ typedef struct SceneProbe {
     float min[3], max[3]; /* NaN: absent */
 } SceneProbe;
 
+/* Names of enumerations that the command line knows too. view.c turns positions into the renderer's. */
+#define RENDER_LOOKS   "water|particles"
+#define RENDER_FIELDS  "speed|density|pressure|age|window"
+#define RENDER_HUDS    "off|on|timing"
+#define RENDER_CAMERAS "chase|fixed|orbit|top|bow"
+
+typedef enum RenderField {
+    RENDER_SPEED,
+    RENDER_DENSITY,
+    RENDER_PRESSURE,
+    RENDER_AGE,
+    RENDER_WINDOW,
+    RENDER_FIELD_COUNT
+} RenderField;
+
+typedef enum RenderHud { RENDER_HUD_OFF, RENDER_HUD_ON, RENDER_HUD_TIMING } RenderHud;
+
+/* NaN, NULL: absent, and chosen by the size of what is looked at. */
+typedef struct SceneCamera {
+    const char *name;
+    int type;         /* position in RENDER_CAMERAS */
+    const char *body; /* that is followed */
+    float eye[3], target[3], forward[3];
+    float distance, height, look_up, azimuth, period, smoothing, fov;
+} SceneCamera;
+
+typedef struct SceneMaterial {
+    const char *name; /* of a body */
+    int material;     /* 0 paint, 1 hull, 2 stone */
+    float color[3];
+    float waterline, cabin_base, cabin_top; /* m, world at the start; NaN: absent */
+} SceneMaterial;
+
+/* How frames are drawn. */
+typedef struct SceneRender {
+    int fps, width, height, supersample;
+    int look, field;            /* positions in RENDER_LOOKS, RENDER_FIELDS */
+    float field_min, field_max; /* NaN: the field's own */
+    int hud;                    /* RenderHud */
+    bool fade;
+    float fade_in, fade_out; /* s */
+    float fade_edge;         /* m */
+    float ripples;
+    float sun[3];
+    const char *camera; /* NULL: the first of `cameras`, or the one that suits the scene */
+    FieldList cameras;  /* of SceneCamera */
+    FieldList bodies;   /* of SceneMaterial */
+} SceneRender;
+
+typedef struct ScenePathPoint {
+    double time, x, z; /* s, m: an entry of SkiffSeaDef.path */
+} ScenePathPoint;
+
+typedef struct SceneSea {
+    float level;
+    const char *follow; /* NULL: absent */
+    FieldList path;     /* of ScenePathPoint */
+    bool absorb;
+    float absorb_min[3], absorb_max[3]; /* NaN: absent */
+} SceneSea;
+
 typedef struct SceneFile {
     const char *schema;
     int version;
     const char *title, *description;
     SceneConfiguration *configuration;
-    SceneTank *tank;   /* NULL: absent */
-    FieldList blocks;  /* of SkiffBlockDef */
-    FieldList bodies;  /* of SceneBody */
-    FieldList probes;  /* of SceneProbe */
-    const char *input; /* NULL: absent */
-    FieldList keys;    /* of ScriptKey */
+    SceneTank *tank;     /* NULL: absent */
+    SceneSea *sea;       /* NULL: absent */
+    FieldList blocks;    /* of SkiffBlockDef */
+    FieldList bodies;    /* of SceneBody */
+    FieldList probes;    /* of SceneProbe */
+    const char *input;   /* NULL: absent */
+    FieldList keys;      /* of ScriptKey */
+    SceneRender *render; /* NULL: absent */
 } SceneFile;
 
 extern const ObjectType scene_file_type;
+
+/* What an empty section "Render" means. */
+SceneRender scene_render_default(void);
+/* Names of all cameras, "a|b|c": those of `render` (NULL: none), then those that always exist,
+ * RENDER_CAMERAS. Returns the length; writes nothing where out is NULL, else size is at least the length + 1.
+ */
+size_t scene_camera_names(const SceneRender *render, char *out, size_t size);
+/* A camera of which nothing is said. */
+void scene_camera_default(SceneCamera *camera);
 
 #endif

@@ -35,7 +35,8 @@ setup_packages() {
     setup_command gcc "${CC:-cc}" gcc clang
     setup_command cmake cmake
     setup_command ninja-build ninja make
-    setup_package libc6-dev libjansson-dev libcglm-dev libxxhash-dev libpng-dev libegl-dev libgl-dev libosmesa6-dev
+    setup_package libc6-dev libjansson-dev libcglm-dev libxxhash-dev libpng-dev libegl-dev libgl-dev \
+        libegl1 libegl-mesa0 libgl1-mesa-dri libosmesa6 libstb-dev fonts-dejavu-core
     case $1 in
     test | ci) setup_package libcmocka-dev ;;
     esac

@@ -1,5 +1,6 @@
 /* Timed phases of a step, in the order they run. PHASE(id, key, label). Keys name columns of steps.csv and of summary.json. */
 PHASE(CONTROLS, "controls", "propulsion and steering")
+PHASE(WINDOW, "window", "window moved: water left behind, water at rest ahead")
 PHASE(EMIT, "emit", "blocks of fluid emitted")
 PHASE(BODIES, "bodies", "body samples moved and sorted")
 PHASE(SORT, "sort", "cells and stable sort")
@@ -9,3 +10,4 @@ PHASE(DIVERGENCE, "divergence", "divergence solve")
 PHASE(FORCES, "forces", "gravity, viscosity, friction")
 PHASE(PRESSURE, "pressure", "density solve")
 PHASE(ADVANCE, "advance", "positions, body motion, checks")
+PHASE(ABSORB, "absorb", "water let in and taken out at the edge")

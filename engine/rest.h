@@ -59,6 +59,7 @@ typedef struct RestCloud {
     Rows rows;
     Boundary boundary; /* the simulation's samples with contacts of the cloud's own */
     Dfsph dfsph;
+    float counted_below; /* y: candidates above lack neighbours and do not count in the mean density */
     Buffer marks, laid, source, fate;            /* rest_gather.c */
     Buffer frozen, held;                         /* [points] 1: gets no row; gets one but does not move */
     Buffer state, constant, sum, density, order; /* rest_select.c */

@@ -242,6 +242,8 @@ static void add_existing(Gather *gather) {
 bool rest_gather(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err) {
     Gather gather = {.sim = sim, .request = request};
     RestCloud *cloud = &sim->rest;
+    /* water that fits the walls has a true surface, no air over it */
+    cloud->counted_below = request->fitted != NULL ? request->surface - sim->kernel.support : INFINITY;
     uint32_t laid;
     if (!make_cells(&gather, err) || !lay_points(&gather, &laid, err))
         return false;

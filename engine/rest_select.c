@@ -128,6 +128,8 @@ static DensitySums measure(Select *select) {
     for (uint32_t i = 0; i < select->count; i++) {
         if (select->state[i] != CANDIDATE)
             continue;
+        if (select->cloud->points.position[i][1] >= select->cloud->counted_below)
+            continue;
         const double density = (double)select->density[i];
         sums.count++;
         sums.mean += density;

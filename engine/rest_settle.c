@@ -200,7 +200,7 @@ static void take_over(SkiffSim *sim, double birth, SkiffFill *fill) {
     const Particles *points = &sim->rest.points;
     for (uint32_t i = 0; i < points->count; i++) {
         const RestKind kind = rest_kind(points->id[i]);
-        if (kind == REST_EXISTING)
+        if (kind == REST_EXISTING || kind == REST_EXISTING_RIM)
             continue;
         const uint32_t to =
             particles_append(&sim->particles, points->position[i], (const float[3]){0}, birth);
@@ -266,7 +266,8 @@ bool rest_fill(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *
     good = good && (all || rest_settle(sim, fill, err));
     if (good)
         take_over(sim, request->birth, fill);
-    good = good && (!all || rest_settle_all(sim, first_id, fill, err));
+    good = good && (!all || (request->fitted != NULL && fill->candidates == 0) ||
+                    rest_settle_all(sim, first_id, fill, err));
     if (!good)
         undo(sim, first_id);
     fill->load_ms = gathered - start;

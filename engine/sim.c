@@ -168,6 +168,7 @@ static bool make_body(SkiffSim *sim, const SkiffDef *def, int index, Err *err) {
     Body *body = &sim->bodies[index];
     if (!body_make(&def->bodies[index], path, body, err))
         return false;
+    body->fixed = body->fixed && !def->sea.on; /* a window's frame moves: nothing else stands still in it */
     for (int other = 0; other < index; other++)
         if (sim->bodies[other].name && strcmp(body->name, sim->bodies[other].name) == 0)
             return err_add(err, ERR_INPUT, "%s.name: '%s' is also the name of RigidBodies[%d]", path,
@@ -227,7 +228,7 @@ static double penetration(const Body *a, const Body *b) {
     return deepest;
 }
 
-static bool check_overlaps(const SkiffSim *sim, Err *err) {
+static bool check_overlaps(const SkiffSim *sim, const SkiffDef *def, Err *err) {
     bool good = true;
     const double tolerance = (double)sim->params.particle_radius;
     for (int a = 0; a < sim->body_count; a++) {
@@ -239,8 +240,8 @@ static bool check_overlaps(const SkiffSim *sim, Err *err) {
                                "RigidBodies[%d]: overlaps RigidBodies[%d] by %.3g m (allowed: %.3g m)", a, b,
                                depth, tolerance);
         }
-        if (sim->tank.kind == SKIFF_GEOMETRY_NONE)
-            continue;
+        if (sim->tank.kind == SKIFF_GEOMETRY_NONE || def->sea.on)
+            continue; /* the sea goes on behind a window's walls */
         const Body *body = &sim->bodies[a];
         double worst = -INFINITY;
         for (uint32_t v = 0; v < body->mesh.vertex_count; v++) {
@@ -332,6 +333,11 @@ static uint64_t hash_def(const SkiffSim *sim, const SkiffDef *def) {
         XXH3_64bits_update(&state, &sim->drives[d].def, sizeof(SkiffDriveDef));
     }
     XXH3_64bits_update(&state, &sim->domain, sizeof sim->domain);
+    XXH3_64bits_update(&state, &sim->sea.level, sizeof sim->sea.level);
+    XXH3_64bits_update(&state, &sim->sea.follow, sizeof sim->sea.follow);
+    XXH3_64bits_update(&state, def->sea.path, (size_t)def->sea.path_count * sizeof *def->sea.path);
+    XXH3_64bits_update(&state, &def->sea.absorb, sizeof def->sea.absorb);
+    XXH3_64bits_update(&state, def->sea.region_min, 6 * sizeof(float));
     return XXH3_64bits_digest(&state);
 }
 
@@ -369,12 +375,13 @@ static bool build(SkiffSim *sim, const SkiffDef *def, Err *err) {
     good = make_tank(sim, def, err);
     for (sim->body_count = 0; sim->body_count < def->body_count; sim->body_count++)
         good = make_body(sim, def, sim->body_count, err) && good;
-    good = good && drives_make(sim, def, err) && check_overlaps(sim, err) && choose_domain(sim, def, err) &&
-           boundary_weigh(&sim->boundary.fixed, &sim->kernel, err) &&
+    good = good && drives_make(sim, def, err) && check_overlaps(sim, def, err) &&
+           choose_domain(sim, def, err) && boundary_weigh(&sim->boundary.fixed, &sim->kernel, err) &&
            sim_reserve(sim, (uint32_t)particles, err) &&
            boundary_place(&sim->boundary, sim->bodies, sim->body_count, sim->origin, sim->kernel.support,
                           sim->threads, err) &&
-           block_emit(sim, &sim->stats.particles_in[SKIFF_IN_EMITTED], err) && probes_make(sim, def, err);
+           sea_make(sim, def, err) && block_emit(sim, &sim->stats.particles_in[SKIFF_IN_EMITTED], err) &&
+           probes_make(sim, def, err);
     if (!good)
         return false;
     sim->def_hash = hash_def(sim, def);
@@ -420,5 +427,7 @@ void skiff_destroy(SkiffSim *sim) {
     buffer_free(&sim->sums);
     tile_free(&sim->tile);
     rest_cloud_free(&sim->rest);
+    sea_free(&sim->sea);
+    ghosts_free(&sim->ghosts);
     free(sim);
 }

@@ -3,7 +3,7 @@
 #define SKIFF_SIM_H
 
 #include "drive.h"
-#include "rest.h"
+#include "sea.h"
 #include "shape.h"
 
 typedef struct EmitBlock {
@@ -64,6 +64,8 @@ struct SkiffSim {
     /* filling */
     RestTile tile; /* loaded with the first fill */
     RestCloud rest;
+    Sea sea;
+    Ghosts ghosts;
     SkiffFill fill;
 
     /* advance */

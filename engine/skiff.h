@@ -172,6 +172,21 @@ typedef struct SkiffProbeDef {
     float min[3], max[3];
 } SkiffProbeDef;
 
+/* A sea without end around the tank [Carensac2023 sec. 4]: the tank is filled to `level` with water at rest,
+ * becomes the window that follows a body, and waves die at its walls. */
+typedef struct SkiffSeaDef {
+    bool on;
+    float level;        /* y of the still surface, m */
+    const char *follow; /* a body's name, or NULL */
+    const double (
+        *path)[3]; /* t (s), x, z (m): where the middle of the window goes instead; NULL: it stays */
+    int path_count;
+    bool absorb;
+    bool has_region; /* absorption only where [min, max] is, m */
+    float region_min[3], region_max[3];
+    const char *cache; /* folder for water that was made before, or NULL */
+} SkiffSeaDef;
+
 typedef enum SkiffSimd { SKIFF_SIMD_AUTO, SKIFF_SIMD_PLAIN, SKIFF_SIMD_AVX2, SKIFF_SIMD_AVX512 } SkiffSimd;
 
 typedef struct SkiffDef {
@@ -181,6 +196,7 @@ typedef struct SkiffDef {
     int block_count;
     const SkiffBodyDef *bodies;
     int body_count;
+    SkiffSeaDef sea;
     const SkiffProbeDef *probes;
     int probe_count;
     double start_time; /* s */
@@ -277,6 +293,9 @@ const uint8_t *skiff_body_materials(const SkiffSim *sim, int index);
 /* "" past the last one, and for faces before the first record. */
 const char *skiff_body_material_name(const SkiffSim *sim, int index, int material);
 
+/* The surface of the tank, window-local; no triangles where there is none. Owned by the simulation. */
+void skiff_tank_mesh(const SkiffSim *sim, const float (**vertices)[3], uint32_t *vertex_count,
+                     const uint32_t (**triangles)[3], uint32_t *triangle_count);
 /* ---- Driving. Drives are numbered in the order of their bodies. ---- */
 
 /* What the helmsman does. All zero: nothing. */
@@ -359,6 +378,28 @@ typedef struct SkiffStats {
     double step_ms;
 } SkiffStats;
 const SkiffStats *skiff_stats(const SkiffSim *sim);
+
+/* Where the window is. False: there is none. */
+typedef struct SkiffWindow {
+    double centre[3]; /* world, m; y of the still surface */
+    double level;     /* y of the still surface, world, m */
+    uint64_t moves;
+} SkiffWindow;
+bool skiff_window(const SkiffSim *sim, SkiffWindow *window);
+/* Distance to the window's edge, m, negative inside, of window-local points. */
+void skiff_window_distances(const SkiffSim *sim, const float (*position)[4], uint32_t count, float *distance);
+
+/* Particles that a window move or absorption took away during the last half second; window-local, where and
+ * how fast they were then. */
+typedef struct SkiffGhosts {
+    uint32_t count;
+    const float (*position)[4];
+    const float (*velocity)[4];
+    const uint64_t *id;
+    const double *birth;
+    const double *removed; /* s */
+} SkiffGhosts;
+SkiffGhosts skiff_ghosts(const SkiffSim *sim);
 
 /* What filling with water at rest did: counts, densities and times of [Carensac2023 table 1]. Densities are
  * relative to rest density, over the candidates (points that feel a solid or existing water). */

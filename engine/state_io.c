@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { STATE_VERSION = 2, BODY_SCALARS = 3 + 4 + 3 + 3 };
+enum { STATE_VERSION = 3, BODY_SCALARS = 3 + 4 + 3 + 3 };
 
 static void body_to_scalars(const Body *body, double *out) {
     memcpy(out, body->position, 3 * sizeof(double));
@@ -44,11 +44,11 @@ bool skiff_save(const SkiffSim *sim, const char *path, Err *err) {
         drive_to_scalars(&sim->drives[d], drives + d * DRIVE_SCALARS);
     for (int b = 0; b < sim->block_count; b++)
         emitted[b] = sim->blocks[b].done;
-    const uint64_t header[3] = {sim->def_hash, sim->step, sim->particles.next_id};
+    const uint64_t header[4] = {sim->def_hash, sim->step, sim->particles.next_id, sim->sea.moves};
     const double place[4] = {sim->time, sim->origin[0], sim->origin[1], sim->origin[2]};
     StateField fields[PARTICLE_FIELD_COUNT + 5];
     uint32_t count = 0;
-    add_field(fields, &count, "header", STATE_U64, 1, 3, header);
+    add_field(fields, &count, "header", STATE_U64, 1, 4, header);
     add_field(fields, &count, "time_and_origin", STATE_F64, 1, 4, place);
     for (int f = 0; f < PARTICLE_FIELD_COUNT; f++)
         add_field(fields, &count, particle_fields[f].name, particle_fields[f].type,
@@ -65,7 +65,7 @@ bool skiff_save(const SkiffSim *sim, const char *path, Err *err) {
 
 /* Everything checked before anything is changed. */
 static bool load_fields(SkiffSim *sim, const StateFile *file, const char *path, Err *err) {
-    const StateField *header = state_file_field(file, "header", STATE_U64, 1, 3, err);
+    const StateField *header = state_file_field(file, "header", STATE_U64, 1, 4, err);
     const StateField *place = state_file_field(file, "time_and_origin", STATE_F64, 1, 4, err);
     const StateField *bodies =
         state_file_field(file, "bodies", STATE_F64, BODY_SCALARS, (uint64_t)sim->body_count, err);
@@ -80,9 +80,8 @@ static bool load_fields(SkiffSim *sim, const StateFile *file, const char *path, 
     if (numbers[0] != sim->def_hash)
         return err_set(err, ERR_INPUT,
                        "%s: the state was saved by another scene, or by this one with other settings", path);
-    if (position->count > sim->particles.capacity)
-        return err_set(err, ERR_INPUT, "%s: holds %llu particles, the scene has room for %u", path,
-                       (unsigned long long)position->count, sim->particles.capacity);
+    if (position->count > UINT32_MAX / 2)
+        return err_set(err, ERR_INPUT, "%s: holds %llu particles", path, (unsigned long long)position->count);
     const StateField *fields[PARTICLE_FIELD_COUNT];
     for (int f = 0; f < PARTICLE_FIELD_COUNT; f++) {
         fields[f] = state_file_field(file, particle_fields[f].name, particle_fields[f].type,
@@ -95,6 +94,8 @@ static bool load_fields(SkiffSim *sim, const StateFile *file, const char *path, 
         if (!drive_check_scalars((const double *)drives->data + d * DRIVE_SCALARS, &reason))
             return err_set(err, ERR_INPUT, "%s: drives[%d]: %s", path, d, reason.message);
     }
+    if (!sim_reserve(sim, (uint32_t)position->count, err))
+        return false;
     Particles *particles = &sim->particles;
     particles->count = (uint32_t)position->count;
     for (int f = 0; f < PARTICLE_FIELD_COUNT; f++) {
@@ -105,6 +106,7 @@ static bool load_fields(SkiffSim *sim, const StateFile *file, const char *path, 
     }
     sim->step = numbers[1];
     particles->next_id = numbers[2];
+    sim->sea.moves = numbers[3];
     const double *numbers_place = place->data;
     sim->time = numbers_place[0];
     memcpy(sim->origin, numbers_place + 1, sizeof sim->origin);

@@ -236,6 +236,7 @@ bool skiff_step(SkiffSim *sim, Err *err) {
     bool good = true;
     begin_stats(&sim->stats);
     PHASE_RUN(CONTROLS, drives_apply(sim));
+    PHASE_RUN(WINDOW, good = window_follow(sim, err));
     PHASE_RUN(EMIT, good = block_emit(sim, &sim->stats.particles_in[SKIFF_IN_EMITTED], err));
     PHASE_RUN(BODIES, good = place_bodies(sim, err));
     PHASE_RUN(SORT, good = sort_particles(sim, err));
@@ -245,6 +246,7 @@ bool skiff_step(SkiffSim *sim, Err *err) {
     PHASE_RUN(FORCES, apply_forces(sim));
     PHASE_RUN(PRESSURE, solve_density(sim));
     PHASE_RUN(ADVANCE, measure_forces(sim); advance(sim); good = check(sim, err));
+    PHASE_RUN(ABSORB, good = absorb_waves(sim, err));
     sim->stats.step_ms = timer_ms() - begin;
     if (!good)
         err_prefix(err, "step %llu (t = %.6g s)", (unsigned long long)sim->step, sim->time);

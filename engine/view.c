@@ -81,13 +81,22 @@ void skiff_body_push(SkiffSim *sim, int index, const double force[3], const doub
     }
 }
 
-void skiff_body_mesh(const SkiffSim *sim, int index, const float (**vertices)[3], uint32_t *vertex_count,
-                     const uint32_t (**triangles)[3], uint32_t *triangle_count) {
-    const Mesh *mesh = &sim->bodies[index].mesh;
+static void look_at_mesh(const Mesh *mesh, const float (**vertices)[3], uint32_t *vertex_count,
+                         const uint32_t (**triangles)[3], uint32_t *triangle_count) {
     *vertices = (const float(*)[3])mesh->vertices;
     *vertex_count = mesh->vertex_count;
     *triangles = (const uint32_t(*)[3])mesh->triangles;
     *triangle_count = mesh->triangle_count;
+}
+
+void skiff_body_mesh(const SkiffSim *sim, int index, const float (**vertices)[3], uint32_t *vertex_count,
+                     const uint32_t (**triangles)[3], uint32_t *triangle_count) {
+    look_at_mesh(&sim->bodies[index].mesh, vertices, vertex_count, triangles, triangle_count);
+}
+
+void skiff_tank_mesh(const SkiffSim *sim, const float (**vertices)[3], uint32_t *vertex_count,
+                     const uint32_t (**triangles)[3], uint32_t *triangle_count) {
+    look_at_mesh(&sim->tank.mesh, vertices, vertex_count, triangles, triangle_count);
 }
 
 const uint8_t *skiff_body_materials(const SkiffSim *sim, int index) {

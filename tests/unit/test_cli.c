@@ -187,7 +187,7 @@ static void help_explains_every_command(void **state) {
     (void)state;
     static const char *const commands[] = {"run", "check", "bench"};
     expect("--help", 0, "Usage:", NULL);
-    expect("-h", 0, "Exit codes: 0 ok, 2 usage, 3 bad input, 5 diverged", NULL);
+    expect("-h", 0, "Exit codes: 0 ok, 2 usage, 3 bad input, 4 no OpenGL, 5 diverged", NULL);
     expect("help", 0, "skiff bench SCENE", NULL);
     expect("--version", 0, "commit ", NULL);
     expect("rest --help", 0, "skiff rest cut DIR -o FILE", NULL);

@@ -17,14 +17,15 @@
 enum { MAX_LINES = 800, MAX_FILES = 2000, PATH_SIZE = 512 };
 
 /* Headers of C and of the system, open to all. */
-static const char libc_headers[] = " assert.h complex.h ctype.h dirent.h dlfcn.h errno.h fcntl.h fenv.h "
-                                   "float.h getopt.h glob.h inttypes.h iso646.h libgen.h"
-                                   " limits.h locale.h malloc.h math.h poll.h pthread.h pwd.h sched.h "
-                                   "semaphore.h setjmp.h signal.h spawn.h stdalign.h stdarg.h"
-                                   " stdatomic.h stdbool.h stddef.h stdint.h stdio.h stdlib.h stdnoreturn.h "
-                                   "string.h strings.h tgmath.h time.h unistd.h wchar.h"
-                                   " sys/mman.h sys/resource.h sys/stat.h sys/statvfs.h sys/sysinfo.h "
-                                   "sys/time.h sys/types.h sys/uio.h sys/utsname.h sys/wait.h ";
+static const char libc_headers[] =
+    " assert.h complex.h ctype.h dirent.h dlfcn.h errno.h fcntl.h fenv.h "
+    "float.h getopt.h glob.h inttypes.h iso646.h libgen.h"
+    " limits.h locale.h malloc.h math.h poll.h pthread.h pwd.h sched.h "
+    "semaphore.h setjmp.h signal.h spawn.h stdalign.h stdarg.h"
+    " stdatomic.h stdbool.h stddef.h stdint.h stdio.h stdlib.h stdnoreturn.h "
+    "string.h strings.h tgmath.h time.h unistd.h wchar.h"
+    " sys/mman.h sys/resource.h sys/socket.h sys/stat.h sys/statvfs.h sys/sysinfo.h "
+    "sys/time.h sys/types.h sys/uio.h sys/utsname.h sys/wait.h ";
 
 /* What the files of a folder may include: folders or single files of the tree, and other system headers (a
  * final '/' stands for all below). The first row whose path begins a file's path counts. tests/ has no row:
@@ -37,7 +38,7 @@ static const struct Layer {
     {"engine/passes.c", " engine/ ", " cglm/ xxhash.h omp.h immintrin.h arm_neon.h "},
     {"engine/base/", " engine/base/ ", " xxhash.h sanitizer/asan_interface.h "},
     {"engine/", " engine/ ", " cglm/ xxhash.h omp.h "},
-    {"render/", " render/ engine/base/ generated/ ", " cglm/ GL/ EGL/ KHR/ png.h "},
+    {"render/", " render/ engine/base/ generated/ ", " cglm/ GL/ EGL/ KHR/ png.h stb/ "},
     {"app/", " app/ engine/skiff.h engine/base/ render/gfx.h generated/ ", " cglm/ jansson.h omp.h "},
 };
 

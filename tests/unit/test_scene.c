@@ -51,10 +51,10 @@ static const struct {
     {"{\"version\": 1, \"Tnak\": {}}", "s.json: Tnak: unknown key, did you mean Tank?"},
     {"{\"version\": 1, \"Boats\": {}}",
      "s.json: Boats: unknown key, expected one of $schema, version, title, description, Configuration, Tank, "
-     "FluidBlocks, RigidBodies, Probes, input, Keys"},
+     "FluidBlocks, RigidBodies, Probes, input, Keys, Render"},
     {"{\"version\": 1, \"\\u001b[31m\": 1}",
      "s.json: ?[31m: unknown key, expected one of $schema, version, title, description, Configuration, Tank, "
-     "FluidBlocks, RigidBodies, Probes, input, Keys"},
+     "FluidBlocks, RigidBodies, Probes, input, Keys, Render"},
 };
 
 /* Bodies of a scene: `"version": 1` stands before them. */
@@ -193,6 +193,10 @@ static const struct {
      "s.json: Keys[0].value: expected a number from -1 to 1, found 2"},
     {"\"Keys\": [{\"key\": \"w\", \"action\": \"throttle\", \"camera\": \"top\"}]",
      "s.json: Keys[0].camera: has no meaning for action \"throttle\", only for \"camera\""},
+    {"\"Keys\": [{\"key\": \"c\", \"action\": \"camera\", \"camera\": \"mats\"}], \"Render\": {\"cameras\": "
+     "[{\"name\": \"mast\", \"type\": \"bow\"}]}",
+     "s.json: Keys[0].camera: there is no camera mats, did you mean mast?; there are "
+     "mast|chase|fixed|orbit|top|bow"},
     {"\"Keys\": [{\"key\": \"w\", \"action\": \"throttle\"}, {\"key\": \"w\", \"action\": \"rudder\"}]",
      "s.json: Keys[1]: key w is bound by Keys[0] already"},
 

@@ -1,0 +1,215 @@
+/* Waves die at the edge [Carensac2023 sec. 4.2]: water that rises above the still surface close to the walls
+ * is taken out, and where a trough opens a gap there, water comes in.
+ *
+ * It comes in at points of water at rest that fits the walls: all of them could be filled at once and be at
+ * rest, so every point can be decided by itself. Decisions use the cells of this step's sort, whose particles
+ * have moved by one step since: far less than the cells' slack. */
+#include "sim.h"
+
+#include <math.h>
+
+static bool in_region(const Sea *sea, const float p[3]) {
+    for (int k = 0; sea->has_region && k < 3; k++)
+        if (!(p[k] >= sea->region_min[k] && p[k] <= sea->region_max[k]))
+            return false;
+    return true;
+}
+
+/* ---- Inlets ---- */
+
+static bool inlet_reserve(Sea *sea, uint32_t count, Err *err) {
+    const size_t padded = (size_t)count + SLICE;
+    if (!buffer_reserve(&sea->inlet_buffer, "inlets", padded * (2 * sizeof(Float4) + sizeof(float[2])),
+                        err) ||
+        !buffer_reserve(&sea->flow_buffer, "inflow", padded * sizeof(Float4), err))
+        return false;
+    sea->inlets = sea->inlet_buffer.data;
+    sea->inlet_normals = sea->inlets + padded;
+    sea->inlet_pressure = (void *)(sea->inlet_normals + padded);
+    return true;
+}
+
+/* What the walls contribute to the density at an inlet: sum psi_b W, once for all. */
+static float wall_density(const SkiffSim *sim, const float p[3]) {
+    const SampleSet *walls = &sim->boundary.fixed.sorted;
+    const CellGrid *grid = &walls->grid;
+    int32_t c[3];
+    for (int k = 0; k < 3; k++) {
+        c[k] = (int32_t)floorf((p[k] - grid->origin[k]) * grid->inv_size);
+        if (walls->count == 0 || c[k] < 1 || c[k] + 1 >= grid->size[k])
+            return 0.0f;
+    }
+    double sum = 0.0;
+    for (int run = 0; run < 9; run++) {
+        const int32_t cell = cell_grid_index(grid, c[0] + run / 3 - 1, c[1], c[2] + run % 3 - 1);
+        for (uint32_t s = grid->start[cell - 1]; s < grid->start[cell + 2]; s++) {
+            const float dx = p[0] - walls->x[s], dy = p[1] - walls->y[s], dz = p[2] - walls->z[s];
+            sum += (double)(walls->volume[s] * kernel_w(&sim->kernel, sqrtf(dx * dx + dy * dy + dz * dz)));
+        }
+    }
+    return (float)sum;
+}
+
+bool absorb_make(SkiffSim *sim, Err *err) {
+    Sea *sea = &sim->sea;
+    if (!sea->absorbs)
+        return true;
+    const float layer = sim->params.inflow_layer * sim->params.particle_radius;
+    const float level = (float)(sea->level - sim->origin[1]);
+    uint32_t count = 0;
+    if (!inlet_reserve(sea, sea->ring.count, err))
+        return false;
+    for (uint32_t i = 0; i < sea->ring.count; i++) {
+        const float *p = sea->ring.position[i];
+        float normal[3];
+        if (p[1] >= level || !in_region(sea, p) || shape_distance_sides(&sim->tank, p, normal) < -layer)
+            continue;
+        memcpy(sea->inlets[count], p, 3 * sizeof(float));
+        sea->inlets[count][3] = wall_density(sim, p);
+        const float length = sqrtf(normal[0] * normal[0] + normal[2] * normal[2]);
+        sea->inlet_normals[count][0] = length > 0.0f ? -normal[0] / length : 0.0f;
+        sea->inlet_normals[count][2] = length > 0.0f ? -normal[2] / length : 0.0f;
+        memcpy(sea->inlet_pressure[count], sea->ring.pressure[i], sizeof(float[2]));
+        count++;
+    }
+    sea->inlet_count = count;
+    return true;
+}
+
+static bool body_is_near(const SkiffSim *sim, const float p[3], float distance) {
+    const SampleSet *bodies = &sim->boundary.moving.sorted;
+    const CellGrid *grid = &bodies->grid;
+    int32_t c[3];
+    for (int k = 0; k < 3; k++) {
+        c[k] = bodies->count > 0 ? (int32_t)floorf((p[k] - grid->origin[k]) * grid->inv_size) : -1;
+        if (c[k] < 1 || c[k] + 1 >= grid->size[k])
+            return false;
+    }
+    if (!bodies->occupied[cell_grid_index(grid, c[0], c[1], c[2])])
+        return false;
+    for (int run = 0; run < 9; run++) {
+        const int32_t cell = cell_grid_index(grid, c[0] + run / 3 - 1, c[1], c[2] + run % 3 - 1);
+        for (uint32_t s = grid->start[cell - 1]; s < grid->start[cell + 2]; s++) {
+            const float dx = p[0] - bodies->x[s], dy = p[1] - bodies->y[s], dz = p[2] - bodies->z[s];
+            if (dx * dx + dy * dy + dz * dz < distance * distance)
+                return true;
+        }
+    }
+    return false;
+}
+
+/* Is there room at inlet `index`? flow: the velocity of what would come in; [3] 1 if it does. */
+static void try_inlet(const SkiffSim *sim, uint32_t index, float flow[4]) {
+    const Sea *sea = &sim->sea;
+    const CellGrid *grid = &sim->grid.cells;
+    const float *p = sea->inlets[index];
+    const float distance = sim->params.inflow_distance * sim->params.particle_radius;
+    int32_t c[3];
+    double weight_sum = 0.0, sum[3] = {0};
+    flow[3] = 0.0f;
+    for (int k = 0; k < 3; k++)
+        c[k] = (int32_t)floorf((p[k] - grid->origin[k]) * grid->inv_size);
+    for (int run = 0; run < 9; run++) {
+        const int32_t x = c[0] + run / 3 - 1, z = c[2] + run % 3 - 1;
+        if (x < 0 || z < 0 || x >= grid->size[0] || z >= grid->size[2])
+            continue;
+        const int32_t low = c[1] - 1 < 0 ? 0 : c[1] - 1;
+        const int32_t high = c[1] + 1 >= grid->size[1] ? grid->size[1] - 1 : c[1] + 1;
+        if (low > high)
+            continue;
+        const uint32_t end = grid->start[cell_grid_index(grid, x, high, z) + 1];
+        for (uint32_t j = grid->start[cell_grid_index(grid, x, low, z)]; j < end; j++) {
+            const float *q = sim->particles.position[j];
+            const float dx = p[0] - q[0], dy = p[1] - q[1], dz = p[2] - q[2];
+            const float r_sq = dx * dx + dy * dy + dz * dz;
+            if (r_sq < distance * distance)
+                return;
+            const double weight = (double)(sim->volume * kernel_w(&sim->kernel, sqrtf(r_sq)));
+            weight_sum += weight;
+            for (int k = 0; k < 3; k++)
+                sum[k] += weight * (double)sim->particles.velocity[j][k];
+        }
+    }
+    weight_sum += (double)p[3]; /* the walls, which stand still */
+    if (weight_sum + (double)(sim->volume * sim->kernel.w_scale) > (double)sim->params.inflow_density ||
+        body_is_near(sim, p, distance))
+        return;
+    for (int k = 0; k < 3; k++)
+        flow[k] = weight_sum > 0.0 ? (float)(sum[k] / weight_sum) : 0.0f;
+    const float *normal = sea->inlet_normals[index];
+    if (sim->params.inflow_inwards && flow[0] * normal[0] + flow[2] * normal[2] < 0.0f)
+        return;
+    flow[3] = 1.0f;
+}
+
+/* ---- Steps ---- */
+
+/* The last particle takes the place of one that goes. */
+static void remove_particle(SkiffSim *sim, uint32_t i) {
+    Particles *particles = &sim->particles;
+    const uint32_t last = --particles->count;
+    float *density = sim->rows.density.data, *pressure = sim->pressure.data;
+    density[i] = density[last];
+    pressure[i] = pressure[last];
+    for (int f = 0; f < PARTICLE_FIELD_COUNT; f++) {
+        char *data = particles->front[f].data;
+        const size_t size = particle_fields[f].size;
+        memcpy(data + i * size, data + last * size, size);
+        memset(data + last * size, 0, size);
+    }
+}
+
+static bool let_out(SkiffSim *sim, Err *err) {
+    const Sea *sea = &sim->sea;
+    Particles *particles = &sim->particles;
+    const float level = (float)(sea->level - sim->origin[1]);
+    const float layer = sim->params.outflow_distance * sim->params.particle_radius;
+    for (uint32_t i = particles->count; i-- > 0;) {
+        const float *p = particles->position[i];
+        /* above the surface near the edge; and what has got through or over the walls */
+        const float depth = !in_region(sea, p) ? INFINITY : -shape_distance_sides(&sim->tank, p, NULL);
+        if (!(depth < (p[1] > level ? layer : -sim->params.particle_radius)))
+            continue;
+        if (!ghosts_reserve(&sim->ghosts, 1, sim->time, err))
+            return false;
+        ghosts_add(&sim->ghosts, particles, i, sim->time);
+        remove_particle(sim, i);
+        sim->stats.particles_out[SKIFF_OUT_OUTFLOW]++;
+    }
+    return true;
+}
+
+static bool let_in(SkiffSim *sim, Err *err) {
+    Sea *sea = &sim->sea;
+    Float4 *flow = sea->flow_buffer.data;
+    uint32_t entering = 0;
+    for (uint32_t k = 0; k < sea->inlet_count; k++)
+        entering += flow[k][3] > 0.0f;
+    if (!sim_reserve(sim, sim->particles.count + entering, err) ||
+        !buffer_reserve(&sim->rows.density, "density", (sim->particles.capacity + SLICE) * sizeof(float),
+                        err))
+        return false;
+    float *density = sim->rows.density.data, *pressure = sim->pressure.data;
+    for (uint32_t k = 0; k < sea->inlet_count; k++) {
+        if (!(flow[k][3] > 0.0f))
+            continue;
+        const uint32_t to = particles_append(&sim->particles, sea->inlets[k], flow[k], sim->time);
+        sim->particles.pressure[to] = sea->inlet_pressure[k][0];
+        sim->particles.pressure_divergence[to] = sea->inlet_pressure[k][1];
+        density[to] = 1.0f;
+        pressure[to] = 0.0f;
+        sim->stats.particles_in[SKIFF_IN_INFLOW]++;
+    }
+    return true;
+}
+
+bool absorb_waves(SkiffSim *sim, Err *err) {
+    Sea *sea = &sim->sea;
+    if (!sea->absorbs)
+        return true;
+    Float4 *flow = sea->flow_buffer.data;
+#pragma omp parallel for schedule(static) num_threads(sim->threads)
+    for (uint32_t k = 0; k < sea->inlet_count; k++)
+        try_inlet(sim, k, flow[k]);
+    return let_out(sim, err) && let_in(sim, err);
+}
