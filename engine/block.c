@@ -89,16 +89,19 @@ static bool emit_rest(SkiffSim *sim, const SkiffBlockDef *def, const char *path,
     }
     request.bounds = block.bounds;
     request.surface = block.bounds.max[1];
-    const uint32_t before = sim->particles.count;
-    if (!rest_fill(sim, &request, &sim->fill, err)) {
+    const uint64_t first_id = sim->particles.next_id;
+    SkiffFill fill;
+    if (!rest_fill(sim, &request, &fill, err)) {
         err_prefix(err, "%s", path);
         return false;
     }
-    if (sim->particles.count == before)
+    if (fill.particles == 0)
         return err_add(err, ERR_INPUT, "%s: there is no room for water in it", path);
-    for (uint32_t i = before; i < sim->particles.count; i++)
-        memcpy(sim->particles.velocity[i], def->velocity, sizeof def->velocity);
-    *emitted += sim->particles.count - before;
+    sim->fill = fill;
+    for (uint32_t i = 0; i < sim->particles.count; i++) /* a fill sorts: the new ones are anywhere */
+        if (sim->particles.id[i] >= first_id)
+            memcpy(sim->particles.velocity[i], def->velocity, sizeof def->velocity);
+    *emitted += fill.particles;
     return true;
 }
 

@@ -193,6 +193,8 @@ static void help_explains_every_command(void **state) {
     expect("rest --help", 0, "skiff rest cut DIR -o FILE", NULL);
     expect("help rest", 0, "skiff rest show [FILE]", NULL);
     expect("help rest make", 0, "Usage: skiff rest make [-o FILE] [OPTION]...", NULL);
+    expect("help rest fill", 0, "Usage: skiff rest fill SCENE [OPTION]...", NULL);
+    expect("help reproduce carensac2023", 0, "[EXPERIMENT] [OPTION]...", NULL);
     for (int i = 0; i < COUNT(commands); i++) {
         char arguments[64], usage[64];
         snprintf(usage, sizeof usage, "Usage: skiff %s SCENE", commands[i]);
