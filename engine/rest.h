@@ -65,6 +65,7 @@ typedef struct RestCloud {
     Buffer marks, laid, source, fate; /* rest_gather.c */
     Buffer frozen, held;              /* [points] 1: gets no row; gets one but does not move */
     Buffer state, constant, walls, sum, density, order; /* rest_select.c */
+    Buffer kept[PARTICLE_FIELD_COUNT + 1];              /* existing water as it was, and its densities */
 } RestCloud;
 
 struct SkiffSim;

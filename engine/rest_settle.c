@@ -254,21 +254,66 @@ bool rest_settle_all(SkiffSim *sim, uint64_t first_id, SkiffFill *fill, Err *err
     return good;
 }
 
-/* Takes the new particles out again, in a fill that failed. */
-static void undo(SkiffSim *sim, uint64_t first_id) {
-    uint32_t kept = 0, *order = sim->rest.source.data;
-    for (uint32_t i = 0; i < sim->particles.count; i++)
-        if (sim->particles.id[i] < first_id)
-            order[kept++] = i;
-    particles_permute(&sim->particles, order, kept, sim->threads);
+/* ---- The fill ---- */
+
+/* What a fill that fails has to give back. Only settling all of the water touches what exists: it sorts it.
+ */
+static bool keep_existing(SkiffSim *sim, Err *err) {
+    const Particles *particles = &sim->particles;
+    for (int f = 0; f <= PARTICLE_FIELD_COUNT; f++) {
+        const bool field = f < PARTICLE_FIELD_COUNT;
+        const Buffer *from = field ? &particles->front[f] : &sim->rows.density;
+        const size_t size = particles->count * (field ? particle_fields[f].size : sizeof(float));
+        if (!buffer_reserve(&sim->rest.kept[f], "water kept during a fill", size, err))
+            return false;
+        memcpy(sim->rest.kept[f].data, from->data, size);
+    }
+    return true;
+}
+
+/* `kept`: the fill may have sorted what exists; else it stands before what is new, as it did. */
+static void undo(SkiffSim *sim, uint32_t count, uint64_t first_id, bool kept) {
+    Particles *particles = &sim->particles;
+    particles->count = count;
+    particles->next_id = first_id;
+    for (int f = 0; f < PARTICLE_FIELD_COUNT; f++) {
+        const size_t size = particle_fields[f].size, used = count * size;
+        if (kept)
+            memcpy(particles->front[f].data, sim->rest.kept[f].data, used);
+        memset((char *)particles->front[f].data + used, 0,
+               (particles->capacity + (size_t)SLICE) * size - used);
+    }
+    if (kept)
+        memcpy(sim->rows.density.data, sim->rest.kept[PARTICLE_FIELD_COUNT].data, count * sizeof(float));
+}
+
+/* What is shown until the next step: the pressures of the fill; densities only where it came by them. */
+static void show(SkiffSim *sim, uint64_t first_id, bool all) {
+    float *density = sim->rows.density.data;
+    for (uint32_t i = 0; !all && i < sim->particles.count; i++)
+        if (sim->particles.id[i] >= first_id)
+            density[i] = 0.0f;
+    sim_add_pressures(sim);
+}
+
+static bool check_tile(SkiffSim *sim, Err *err) {
+    if (sim->tile.count == 0 && !tile_load_default(&sim->tile, err))
+        return false;
+    const double own = (double)sim->params.volume_factor, needed = sim->tile.volume_factor;
+    return fabs(own - needed) < 1e-6 * needed ||
+           err_set(err, ERR_INPUT,
+                   "Configuration.volumeFactor: %g, but filling with water at rest needs %g: its points are "
+                   "at rest with that",
+                   own, needed);
 }
 
 bool rest_fill(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err) {
     *fill = (SkiffFill){0};
     const uint64_t first_id = sim->particles.next_id;
+    const uint32_t count = sim->particles.count;
     const bool all = sim->params.rest_settle == REST_SETTLE_ALL;
     const double start = timer_ms();
-    if (request->fitted == NULL && sim->tile.count == 0 && !tile_load_default(&sim->tile, err))
+    if ((request->fitted == NULL && !check_tile(sim, err)) || (all && count > 0 && !keep_existing(sim, err)))
         return false;
     bool good = rest_gather(sim, request, fill, err);
     const double gathered = timer_ms();
@@ -277,10 +322,12 @@ bool rest_fill(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *
     good = good && (all || rest_settle(sim, request->birth, fill, err));
     if (good)
         take_over(sim, 0, request->birth, fill);
-    good = good && (!all || (request->fitted != NULL && fill->candidates == 0) ||
-                    rest_settle_all(sim, first_id, fill, err));
-    if (!good)
-        undo(sim, first_id);
+    const bool fits = request->fitted != NULL && fill->candidates == 0; /* as it is */
+    good = good && (!all || fits || rest_settle_all(sim, first_id, fill, err));
+    if (good)
+        show(sim, first_id, all && !fits);
+    else
+        undo(sim, count, first_id, all && count > 0);
     fill->load_ms = gathered - start;
     fill->select_ms = selected - gathered;
     fill->settle_ms = timer_ms() - selected;
@@ -299,4 +346,6 @@ void rest_cloud_free(RestCloud *cloud) {
                          &cloud->walls,  &cloud->sum,  &cloud->density, &cloud->order};
     for (size_t b = 0; b < sizeof buffers / sizeof *buffers; b++)
         buffer_free(buffers[b]);
+    for (int f = 0; f <= PARTICLE_FIELD_COUNT; f++)
+        buffer_free(&cloud->kept[f]);
 }
