@@ -186,7 +186,8 @@ static void refill(SkiffSim *sim, int settle) {
     const SkiffFill *fill = skiff_fill(sim);
     const SkiffParticles particles = skiff_particles(sim);
     assert_int_equal(particles.count, kept + fill->particles);
-    assert_true(fabs((double)fill->particles / removed - 1.0) < 0.02);
+    /* at a cut through water the selection takes some more than it leaves gaps: 2 % of so small a block */
+    assert_true(fabs((double)fill->particles / removed - 1.0) < 0.03);
     assert_true((fill->active == fill->particles) == (settle == REST_SETTLE_ALL));
     uint32_t moving = 0;
     for (uint32_t i = 0; i < particles.count; i++) {
