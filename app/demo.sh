@@ -5,7 +5,7 @@ set -eu
 root=$(CDPATH='' cd -- "$(dirname -- "$0")/.." && pwd)
 . "$root/app/setup.sh"
 
-setup_packages build
+setup_packages demo
 build=$(setup_build_dir)
 # A first build leaves the tests out, and their packages with them; a folder that has them keeps them.
 if [ -f "$build/CMakeCache.txt" ]; then
@@ -18,5 +18,5 @@ setup_compile "$build" --target skiff_app
 cd "$root"
 # A thread that waits sleeps: where other programs share the cores, spinning costs several times the run.
 export OMP_WAIT_POLICY="${OMP_WAIT_POLICY:-passive}"
-"$build/skiff" run assets/scenes/settling-tank.json -o out/demo --force
-echo "The report is $root/out/demo/report.html"
+"$build/skiff" run assets/scenes/boat.json -o out/demo --force --video
+echo "The film is $root/out/demo/video.mp4, its frames are in $root/out/demo/frames, the report is $root/out/demo/report.html"

@@ -49,6 +49,22 @@ bool edge_map_make(EdgeMap *map, const SkiffSim *sim, const Frame *frame, Err *e
     return true;
 }
 
+float edge_map_at(const EdgeMap *map, float x, float z) {
+    const float point[2] = {x, z};
+    uint32_t at[2];
+    float part[2];
+    for (int k = 0; k < 2; k++) {
+        float place = (point[k] - map->min[k]) / (map->max[k] - map->min[k]) * (float)(map->size[k] - 1);
+        if (!(place >= 0 && place < (float)(map->size[k] - 1)))
+            return -INFINITY;
+        at[k] = (uint32_t)place;
+        part[k] = place - (float)at[k];
+    }
+    const float *near = map->distance + at[1] * map->size[0] + at[0], *far = near + map->size[0];
+    return (near[0] * (1 - part[0]) + near[1] * part[0]) * (1 - part[1]) +
+           (far[0] * (1 - part[0]) + far[1] * part[0]) * part[1];
+}
+
 void edge_map_free(EdgeMap *map) {
     free(map->distance);
     *map = (EdgeMap){0};

@@ -16,6 +16,8 @@ typedef struct EdgeMap {
 /* Around the water of `frame`, which must be the first one: it fills the window. ERR_INPUT when memory is
  * exhausted. */
 bool edge_map_make(EdgeMap *map, const SkiffSim *sim, const Frame *frame, Err *err);
+/* At local x, z, between the samples; beyond them far outside. */
+float edge_map_at(const EdgeMap *map, float x, float z);
 void edge_map_free(EdgeMap *map);
 
 #endif

@@ -15,9 +15,9 @@
 #include <string.h>
 
 static const float spread_begin = 0.25f,
-                   spread_full = 1.1f;                    /* m/s, of velocities in a cell, at Froude scale */
+                   spread_full = 0.95f;                   /* m/s, of velocities in a cell, at Froude scale */
 static const float crest_begin = 1.2f, crest_full = 3.5f; /* m/s, of a crest against the water at rest */
-static const float growth = 5.0f;                         /* 1/s, where both signs are full */
+static const float growth = 6.0f;                         /* 1/s, where both signs are full */
 static const float life_surface = 2.2f, life_deep = 0.5f; /* s, to 1/e */
 static const float cell_full =
     10.0f; /* particles in a cell of the support radius at rest: (2 d)^3 / 0.8 d^3 */

@@ -98,7 +98,7 @@ static const Field camera_fields[] = {
     {ROW(FIELD_FLOAT, SceneCamera, look_up, "lookUp"), COORDINATE, .flags = FIELD_NULLABLE,
      .help = "chase, orbit: how far above the body's centre the camera aims"},
     {ROW(FIELD_FLOAT, SceneCamera, azimuth, "azimuth"), .min = -100, .max = 100, .unit = "rad",
-     .flags = FIELD_NULLABLE, .help = "orbit: where it is at time 0, from +x towards +z"},
+     .flags = FIELD_NULLABLE, .help = "From +x towards +z. orbit: where it is at time 0; chase: how far off the line astern"},
     {ROW(FIELD_FLOAT, SceneCamera, period, "period"), .min = 0, .max = 1e6, .unit = "s",
      .flags = FIELD_NULLABLE, .help = "orbit: time for one turn; 0: it stands still"},
     {ROW(FIELD_FLOAT, SceneCamera, smoothing, "smoothing"), .min = 0, .max = 100, .unit = "s",

@@ -29,7 +29,7 @@ setup_package() {
     done
 }
 
-# setup_packages build|test|ci: installs the Debian packages that are missing; calls apt-get only when some are
+# setup_packages build|demo|test|ci: installs the Debian packages that are missing; calls apt-get only when some are
 setup_packages() {
     missing=
     setup_command gcc "${CC:-cc}" gcc clang
@@ -38,6 +38,7 @@ setup_packages() {
     setup_package libc6-dev libjansson-dev libcglm-dev libxxhash-dev libpng-dev libegl-dev libgl-dev \
         libegl1 libegl-mesa0 libgl1-mesa-dri libosmesa6 libstb-dev fonts-dejavu-core
     case $1 in
+    demo) setup_command ffmpeg ffmpeg ;;
     test | ci) setup_package libcmocka-dev ;;
     esac
     case $1 in

@@ -8,9 +8,9 @@
  * a resumed run draws the frames that it would have drawn. */
 #include "view.h"
 
-#include "edge_map.h"
 #include "foam.h"
 #include "nearest.h"
+#include "ocean.h"
 #include "palette.h"
 #include "shade.h"
 #include "view_memory.h"
@@ -59,7 +59,7 @@ struct View {
     GfxInstance *instances; /* bodies, then the tank */
     uint32_t instance_count;
     int hero; /* the body that cameras follow and whose speed is shown; -1: none */
-    EdgeMap edge_map;
+    Ocean ocean;
     bool has_tank;
     float floor; /* local y of the lowest water at the start, or of the tank */
 
@@ -181,9 +181,9 @@ static void suit_body(GfxCameraDef *def, const SkiffSim *sim, int body) {
     double length = fmax(bounds.max[0] - bounds.min[0], bounds.max[2] - bounds.min[2]);
     SkiffBody pose = skiff_body(sim, body);
     memcpy(def->target, pose.position, sizeof def->target);
-    def->distance = (def->kind == GFX_CAMERA_TOP ? 3.2 : 1.75) * length;
-    def->height = 0.62 * length;
-    def->look_up = 0.05 * length;
+    def->distance = (def->kind == GFX_CAMERA_TOP ? 3.2 : 1.95) * length;
+    def->height = 0.72 * length;
+    def->look_up = 0.22 * length;
     memcpy(def->eye, pose.position, sizeof def->eye);
     if (def->kind == GFX_CAMERA_BOW) {
         def->eye[0] = def->eye[2] = 0;
@@ -408,7 +408,8 @@ static bool make_meshes(View *view, const SkiffSim *sim, double level, Err *err)
     }
     mesh.triangle_colors = NULL;
     skiff_tank_mesh(sim, &mesh.vertices, &mesh.vertex_count, &mesh.triangles, &mesh.triangle_count);
-    view->has_tank = mesh.triangle_count > 0;
+    /* The walls around a window are none that one could see: the sea goes on behind them. */
+    view->has_tank = mesh.triangle_count > 0 && !view->frame.has_window;
     mesh.material = gfx_material_default(GFX_MATERIAL_TANK);
     return !view->has_tank || add_instance(view, &mesh, err);
 }
@@ -430,20 +431,10 @@ static void place_bodies(View *view, const Frame *frame) {
 /* ---- The water around ---- */
 
 static GfxOcean ocean_of(const View *view, const Frame *frame) {
-    const SceneRender *render = &view->options.render;
+    if (frame->has_window && view->ocean.window.distance)
+        return ocean_picture(&view->ocean, &view->options.render, frame);
     GfxOcean ocean = gfx_scene_default().ocean;
-    ocean.ripples = render->ripples;
-    ocean.enabled = frame->has_window && view->edge_map.distance;
-    if (ocean.enabled) {
-        ocean.level = (float)(frame->level - frame->origin[1]);
-        ocean.edge_distance = view->edge_map.distance;
-        memcpy(ocean.edge_size, view->edge_map.size, sizeof ocean.edge_size);
-        memcpy(ocean.edge_min, view->edge_map.min, sizeof ocean.edge_min);
-        memcpy(ocean.edge_max, view->edge_map.max, sizeof ocean.edge_max);
-        ocean.blend[0] = render->fade ? 0.15f * render->fade_edge : 0;
-        ocean.blend[1] = render->fade ? render->fade_edge : 0.01f * frame->spacing;
-        return ocean;
-    }
+    ocean.ripples = view->options.render.ripples;
     double sum = 0;
     for (uint32_t i = 0; i < frame->live; i++)
         sum += (double)frame->position[i][1];
@@ -521,6 +512,7 @@ static bool draw(View *view, const Frame *frame, int number, Err *err) {
         !foam_update(view->foam, frame, view->scalars + view->scalar_capacity, err) ||
         !cut_to_camera(view, frame->controls.camera, err))
         return false;
+    ocean_update(&view->ocean, &view->options.render, frame, view->scalars + view->scalar_capacity);
     GfxCameraView seen = move_cameras(view, frame);
     if (number < view->options.first)
         return true;
@@ -582,7 +574,7 @@ static bool make_picture(View *view, const SkiffSim *sim, Err *err) {
     if (render->hud != RENDER_HUD_OFF && !(view->hud = gfx_hud_create(def.height, err)))
         return false;
     return make_cameras(view, sim, err) && make_meshes(view, sim, level, err) &&
-           edge_map_make(&view->edge_map, sim, &view->frame, err);
+           ocean_make(&view->ocean, &view->scene->def, sim, &view->frame, err);
 }
 
 View *view_create(const ViewOptions *options, const Scene *scene, const SkiffSim *sim, Err *err) {
@@ -671,15 +663,16 @@ static const char *memory_path(const View *view, char path[PATH_SIZE]) {
     return path;
 }
 
-static ViewMemory memory_of(const View *view) {
+static ViewMemory memory_of(View *view) {
     return (ViewMemory){.time = view->before_time,
                         .camera = view->camera,
                         .states = (double *)view->states,
                         .state_count = (uint64_t)view->camera_count * CAMERA_SCALARS,
-                        .foam = view->foam};
+                        .foam = view->foam,
+                        .wake = &view->ocean.wake};
 }
 
-bool view_save(const View *view, Err *err) {
+bool view_save(View *view, Err *err) {
     char path[PATH_SIZE];
     if (!view || !view->foam)
         return true;
@@ -780,7 +773,7 @@ void view_destroy(View *view) {
     free(view->cameras);
     free(view->states);
     free(view->instances);
-    edge_map_free(&view->edge_map);
+    ocean_free(&view->ocean);
     free(view->before);
     free(view->scalars);
     free(view);

@@ -31,7 +31,7 @@ bool view_begin(View *view, const SkiffSim *sim, const ViewControls *controls, c
 bool view_step(View *view, const SkiffSim *sim, const ViewControls *controls, Err *err);
 
 /* Keeps in view.skiff what the next frames depend on beside the simulation; for checkpoints. NULL is fine. */
-bool view_save(const View *view, Err *err);
+bool view_save(View *view, Err *err);
 
 /* Draws frame `number` of the sequence from saved particles; call for each number from 1 on, also for those
  * that --frames leaves out: foam and cameras have a memory. */

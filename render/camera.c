@@ -22,11 +22,13 @@ GfxCameraDef gfx_camera_default(GfxCameraKind kind) {
                         .distance = 7,
                         .height = 2.6,
                         .look_up = 0.3,
-                        .azimuth = 0.7,
+                        .azimuth = 0.55,
                         .smoothing = 0.6,
                         .fov_deg = 45};
-    if (kind == GFX_CAMERA_ORBIT)
+    if (kind == GFX_CAMERA_ORBIT) {
+        def.azimuth = 0.7;
         def.period = 24;
+    }
     if (kind == GFX_CAMERA_TOP)
         def.distance = 12;
     if (kind == GFX_CAMERA_FIXED) {
@@ -154,7 +156,7 @@ GfxCameraView gfx_camera_update(const GfxCameraDef *def, GfxCameraState *state, 
         break;
     case GFX_CAMERA_CHASE:
     case GFX_CAMERA_KIND_COUNT:
-        look_from(def, centre, heading + pi, &view);
+        look_from(def, centre, heading + pi + def->azimuth, &view);
         break;
     }
     return view;

@@ -27,7 +27,7 @@ typedef struct GfxCameraDef {
     double distance;   /* m, > 0. chase, orbit: horizontal, from the body's centre; top: above it */
     double height;     /* m. chase, orbit: of the eye above the body's centre */
     double look_up;    /* m. chase, orbit: what is looked at lies this much above the body's centre */
-    double azimuth;    /* rad. orbit: at time 0, from +x towards +z */
+    double azimuth;    /* rad, from +x towards +z. orbit: at time 0; chase: off the line astern */
     double period;     /* s. orbit: for one turn; 0: stands still */
     double smoothing;  /* s, >= 0: time in which a sudden change of course or height has mostly gone */
     double fov_deg;    /* vertical */

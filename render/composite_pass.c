@@ -8,9 +8,9 @@
 #include <math.h>
 
 static bool create(Pass *pass, Frame *frame, Err *err) {
-    static const char *const samplers[] = {"mesh_image",   "sky_image",        "mesh_depth_image",
-                                           "normal_image", "thickness_image",  "edge_image",
-                                           "ripple_map",   "reflection_image", NULL};
+    static const char *const samplers[] = {
+        "mesh_image", "sky_image",  "mesh_depth_image", "normal_image", "thickness_image",
+        "edge_image", "ripple_map", "reflection_image", "ocean_foam",   NULL};
     static const char *const fragments[PASS_PROGRAMS] = {"composite.frag", "composite_sky.frag"};
     for (int i = 0; i < PASS_PROGRAMS; i++) {
         pass->programs[i] = shader_program(frame->gl, "fill.vert", fragments[i], samplers, err);
@@ -69,7 +69,8 @@ static bool draw(Pass *pass, Frame *frame, Err *err) {
                                      &frame->images[IMAGE_THICKNESS],
                                      &frame->edge_distance,
                                      &frame->ripples,
-                                     &frame->images[IMAGE_REFLECTION]};
+                                     &frame->images[IMAGE_REFLECTION],
+                                     &frame->ocean_foam};
     int water_rows = find_water_rows(frame);
     framebuffer_bind(gl, pass->framebuffers[0], &frame->images[IMAGE_COMPOSED]);
     for (int unit = 0; unit < (int)(sizeof inputs / sizeof inputs[0]); unit++)

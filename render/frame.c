@@ -98,17 +98,22 @@ static void fill_size(float out[4], int width, int height) {
 }
 
 /* Texture coordinates so that sample 0 is at the centre of the first texel, the last at that of the last. */
+static void fill_box(const uint32_t size[2], const float min[2], const float max[2], float box[4]) {
+    for (int k = 0; k < 2; k++) {
+        float n = (float)size[k];
+        box[2 + k] = (n - 1.0f) / (n * (max[k] - min[k]));
+        box[k] = 0.5f / n - min[k] * box[2 + k];
+    }
+}
+
 static void fill_edge(Frame *frame) {
     static const float beyond[4] = {-1.0f, -1.0f, -1.0f, -1.0f};
     const GfxOcean *ocean = &frame->scene->ocean;
     FrameBlock *block = &frame->block;
-    for (int k = 0; k < 2; k++) {
-        float n = (float)ocean->edge_size[k], length = ocean->edge_max[k] - ocean->edge_min[k];
-        float scale = ocean->enabled ? (n - 1.0f) / (n * length) : 1.0f;
-        block->edge_box[2 + k] = scale;
-        block->edge_box[k] = ocean->enabled ? 0.5f / n - ocean->edge_min[k] * scale : 0.0f;
-        block->edge[k] = ocean->blend[k];
-    }
+    memcpy(block->edge_box, (const float[4]){0.0f, 0.0f, 1.0f, 1.0f}, sizeof block->edge_box);
+    if (ocean->enabled)
+        fill_box(ocean->edge_size, ocean->edge_min, ocean->edge_max, block->edge_box);
+    memcpy(block->edge, ocean->blend, sizeof ocean->blend);
     block->edge[2] = ocean->enabled ? 1.0f : 0.0f;
     block->edge[3] = frame->scene->ground && !ocean->enabled ? 1.0f : 0.0f;
     if (ocean->enabled)
@@ -116,6 +121,16 @@ static void fill_edge(Frame *frame) {
                        (int)ocean->edge_size[1], ocean->edge_distance);
     else
         texture_update(frame->gl, &frame->edge_distance, TEXTURE_R32F, 2, 2, beyond);
+}
+
+static void fill_foam(Frame *frame) {
+    static const float none[4] = {0.0f};
+    const GfxOcean *ocean = &frame->scene->ocean;
+    bool some = ocean->enabled && ocean->foam;
+    if (some)
+        fill_box(ocean->foam_size, ocean->foam_min, ocean->foam_max, frame->block.foam_box);
+    texture_update(frame->gl, &frame->ocean_foam, TEXTURE_R32F, some ? (int)ocean->foam_size[0] : 2,
+                   some ? (int)ocean->foam_size[1] : 2, some ? ocean->foam : none);
 }
 
 /* Offsets are reduced to one tile in double precision, so that they are exact far from the world's origin. */
@@ -155,6 +170,7 @@ static void fill_block(Frame *frame) {
     block->sphere[1] = ocean ? 1.0f - 0.5f * spacing / radius : 0.0f;
     block->sphere[3] = spacing;
     fill_edge(frame);
+    fill_foam(frame);
     block->ground[0] = scene->ground_level;
     block->ground[1] = (float)fmod(scene->origin[0], repeat);
     block->ground[2] = (float)fmod(scene->origin[2], repeat);
@@ -184,6 +200,7 @@ static bool create_tables(Frame *frame, Err *err) {
         texture_create(gl, TEXTURE_RGBA8, RIPPLE_MAP_EDGE, RIPPLE_MAP_EDGE, TEXTURE_REPEAT_MIPMAP, ripples);
     frame->color_map = texture_create(gl, TEXTURE_RGBA8, COLOR_MAP_SIZE, 1, TEXTURE_LINEAR, colors);
     frame->edge_distance = texture_create(gl, TEXTURE_R32F, 2, 2, TEXTURE_LINEAR, nothing);
+    frame->ocean_foam = texture_create(gl, TEXTURE_R32F, 2, 2, TEXTURE_LINEAR, nothing);
     free(ripples);
     return true;
 }
@@ -227,6 +244,7 @@ void frame_destroy(Frame *frame, Pass *passes) {
     images_destroy(frame);
     texture_destroy(gl, &frame->ripples);
     texture_destroy(gl, &frame->edge_distance);
+    texture_destroy(gl, &frame->ocean_foam);
     texture_destroy(gl, &frame->color_map);
     destroy_points(gl, &frame->body);
     destroy_points(gl, &frame->droplets);

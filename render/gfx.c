@@ -139,6 +139,20 @@ static bool check_camera(const GfxCamera *camera, Err *err) {
     return true;
 }
 
+/* Samples over an area: numbers of them and bounds along x and z. */
+static bool check_samples(const char *what, const uint32_t size[2], const float min[2], const float max[2],
+                          Err *err) {
+    for (int k = 0; k < 2; k++) {
+        if (size[k] < 2 || size[k] > 4096)
+            return err_set(err, ERR_USAGE, "ocean: %u %s along %c; possible are 2 to 4096", size[k], what,
+                           "xz"[k]);
+        if (!(max[k] > min[k]) || !isfinite(max[k]) || !isfinite(min[k]))
+            return err_set(err, ERR_USAGE, "ocean: %s lie between %c = %g and %g m", what, "xz"[k],
+                           (double)min[k], (double)max[k]);
+    }
+    return true;
+}
+
 static bool check_ocean(const GfxOcean *ocean, Err *err) {
     if (!isfinite(ocean->level) || !(ocean->ripples >= 0.0f && ocean->ripples <= 2.0f))
         return err_set(err, ERR_USAGE, "ocean: level %g m, ripples %g; needed are a finite level and 0 to 2",
@@ -147,15 +161,10 @@ static bool check_ocean(const GfxOcean *ocean, Err *err) {
         return true;
     if (!ocean->edge_distance)
         return err_set(err, ERR_USAGE, "ocean: no distances to the window's edge");
-    for (int k = 0; k < 2; k++) {
-        if (ocean->edge_size[k] < 2 || ocean->edge_size[k] > 4096)
-            return err_set(err, ERR_USAGE, "ocean: %u edge distances along %c; possible are 2 to 4096",
-                           ocean->edge_size[k], "xz"[k]);
-        if (!(ocean->edge_max[k] > ocean->edge_min[k]) || !all_finite(&ocean->edge_max[k], 1) ||
-            !all_finite(&ocean->edge_min[k], 1))
-            return err_set(err, ERR_USAGE, "ocean: edge distances lie between %c = %g and %g m", "xz"[k],
-                           (double)ocean -> edge_min[k], (double)ocean -> edge_max[k]);
-    }
+    if (!check_samples("edge distances", ocean->edge_size, ocean->edge_min, ocean->edge_max, err) ||
+        (ocean->foam &&
+         !check_samples("amounts of foam", ocean->foam_size, ocean->foam_min, ocean->foam_max, err)))
+        return false;
     if (!(ocean->blend[0] >= 0.0f && ocean->blend[0] < ocean->blend[1]))
         return err_set(err, ERR_USAGE, "ocean: blend from %g to %g m; needed is 0 <= from < to",
                        (double)ocean->blend[0], (double)ocean->blend[1]);

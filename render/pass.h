@@ -22,6 +22,7 @@ typedef struct FrameBlock {
     float sphere[4];      /* radius of a particle as drawn, m; part of it by which it is lowered; px of 1 m at
                              depth 1 m      in the full image; spacing, m */
     float edge_box[4];    /* local x, z -> texture coordinates of the edge distance: offset, scale */
+    float foam_box[4];    /* the same for the ocean's foam */
     float edge[4];        /* blend from, to, m; 1: there is an ocean; 1: there is a ground */
     float ground[4];      /* level; world offset of tiles in x, z; strength of ripples */
     float ripple[RIPPLE_LAYERS][4];      /* offset in tiles (2), slope, tiles a metre */
@@ -57,8 +58,8 @@ typedef struct Frame {
     int width, height; /* drawn: with supersampling */
     GLuint empty_vertex_array, block_buffer;
     Texture images[IMAGE_COUNT];
-    Texture ripples, edge_distance, color_map; /* tables */
-    float painted_sun[3];                      /* for which IMAGE_SKY is right */
+    Texture ripples, edge_distance, ocean_foam, color_map; /* tables */
+    float painted_sun[3];                                  /* for which IMAGE_SKY is right */
     MeshStore meshes;
 
     /* Of this image. */

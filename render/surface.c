@@ -16,8 +16,8 @@
 enum {
     MAX_CELLS = 1 << 22,
     DEPTH_BINS = 4096,
-    DROPLETS_EACH = 7,
-    ALONE_AT_MOST = 4, /* particles in 3 x 3 x 3 fine cells, itself included */
+    DROPLETS_EACH = 12,
+    ALONE_AT_MOST = 6, /* particles in 3 x 3 x 3 fine cells, itself included */
 };
 enum {
     MEMORY_BODY,
@@ -173,7 +173,7 @@ static bool is_alone(const Cells *cells, const float p[3]) {
 
 /* A counter-based random number in [0, 1): splitmix64's finaliser of id and draw. */
 static float random_part(uint64_t id, uint64_t draw) {
-    uint64_t z = (id * 64 + draw + 1) * 0x9e3779b97f4a7c15u;
+    uint64_t z = (id * 128 + draw + 1) * 0x9e3779b97f4a7c15u;
     z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
     z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
     return (float)((z ^ (z >> 31)) >> 40) * 0x1p-24f;
@@ -184,14 +184,14 @@ static void add_droplets(SurfaceList *list, const GfxParticles *particles, uint3
     float fade = fade_of(particles, i), d = particles->spacing;
     for (uint64_t k = 0; k < DROPLETS_EACH; k++) {
         SurfacePoint *point = &list->points[list->count++];
-        float along = random_part(id, 5 * k + 3) - 0.5f, size = random_part(id, 5 * k + 4);
+        float along = random_part(id, 8 * k + 6) - 0.5f, size = random_part(id, 8 * k + 7);
         for (uint64_t axis = 0; axis < 3; axis++) {
             /* Two draws: denser in the middle. */
-            float off = random_part(id, 5 * k + axis) + random_part(id, 5 * k + axis + 1) - 1.0f;
+            float off = random_part(id, 8 * k + axis) + random_part(id, 8 * k + axis + 3) - 1.0f;
             float path = particles->velocity ? particles->velocity[i][axis] * DROPLET_SHOW : 0.0f;
-            point->position[axis] = particles->position[i][axis] + 0.8f * d * off + path * along * 2.0f;
+            point->position[axis] = particles->position[i][axis] + 1.3f * d * off + path * along * 2.0f;
         }
-        point->value = d * (0.05f + 0.13f * size * size);
+        point->value = d * (0.03f + 0.10f * size * size * size);
         point->fade = fade * 0.85f;
     }
 }

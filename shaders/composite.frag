@@ -4,7 +4,7 @@
 #include "sky.glsl"
 #include "behind.glsl"
 #include "ripples.glsl"
-uniform sampler2D mesh_image, mesh_depth_image, reflection_image, normal_image, thickness_image, edge_image;
+uniform sampler2D mesh_image, mesh_depth_image, reflection_image, normal_image, thickness_image, edge_image, ocean_foam;
 in vec2 uv;
 layout(location = 0) out vec4 color;
 
@@ -24,6 +24,14 @@ float fluid_part(vec2 p) {
     vec2 off = abs(t - 0.5);
     part = max(off.x, off.y) > 0.5 ? 0.0 : part;
     return edge.z > 0.0 ? part : 1.0;
+}
+
+// Foam on the ocean at local x, z, as if particles lay there: each adds to the pixels of its point as thickness.vert has it.
+float foam_left(vec2 p, float down) {
+    vec2 t = foam_box.xy + p * foam_box.zw;
+    vec2 off = abs(t - 0.5);
+    float point = 0.8 * sphere.x / sphere.w, sum = textureLod(ocean_foam, t, 0.0).r * 1.571 * point * point;
+    return max(off.x, off.y) > 0.5 ? 0.0 : sum / max(down, 0.2);
 }
 
 // Without branches: software GL computes both sides of them anyway, and then merges.
@@ -70,7 +78,7 @@ vec4 see_through(Water water, float ray_length, vec2 bend, float thickness, vec3
 float foam_cover(vec2 p, float amount, float level) {
     float coarse = ripple_layer(2, p, level).z, fine = ripple_layer(3, p, level).w;
     float pattern = 0.58 * coarse + 0.42 * fine;
-    float dense = 1.0 - exp(-1.1 * amount);
+    float dense = 1.0 - exp(-1.3 * amount);
     return clamp(smoothstep(0.85 - dense, 2.0 - 1.2 * dense, pattern + 0.25 * dense) * min(1.0, 4.0 * dense), 0.0, 0.95);
 }
 
@@ -123,7 +131,7 @@ vec3 shade(Water water, vec3 direction, float ray_length, vec3 background, vec3 
     float through = 0.5 - 0.5 * dot(direction, sun.xyz);
     deep += vec3(0.008, 0.135, 0.125) * crest * (0.35 + 0.65 * through);
     deep += vec3(0.0, 0.020, 0.024) * min((1.0 - n.y) * 5.0, 1.5);
-    float foam = sums.g * water.fluid;
+    float foam = mix(ocean ? foam_left(water.place.xz, -direction.y) : 0.0, sums.g, water.fluid);
     deep += vec3(0.03, 0.16, 0.16) * (1.0 - exp(-0.6 * foam)); // bubbles below
     vec4 behind = see_through(water, ray_length, bend, mix(4.0, sums.r, water.fluid),
                               ocean && direction.y < 0.0 ? deep : background);

@@ -3,7 +3,7 @@ const int RIPPLE_LAYERS = 4;
 const float NO_DEPTH = 1e4; // residual depth where no fluid is
 layout(std140) uniform Frame {
     mat4 view, projection, camera;
-    vec4 eye, lens, size, fluid_size, sun, sphere, edge_box, edge, ground;
+    vec4 eye, lens, size, fluid_size, sun, sphere, edge_box, foam_box, edge, ground;
     vec4 ripple[RIPPLE_LAYERS], ripple_turn[RIPPLE_LAYERS];
     vec4 field;
 };
