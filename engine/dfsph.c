@@ -275,6 +275,7 @@ static void prepare(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, f
             const bool few = kind == SOLVE_DIVERGENCE && problem->rows->neighbours[i] < MIN_NEIGHBOURS;
             const bool held = problem->held != NULL && problem->held[i];
             const bool takes_part = i < count && gradient_sum[i][3] > MIN_DIAGONAL && !few && !held;
+            dfsph->direction[i] = dfsph->image[i] = 0.0f; /* other arrays may have lain here */
             dfsph->inv_diagonal[i] = takes_part ? 1.0f / gradient_sum[i][3] : 0.0f;
             if (!held)
                 p[i] = takes_part && p[i] > 0.0f ? warm * p[i] : 0.0f;

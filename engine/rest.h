@@ -59,11 +59,12 @@ typedef struct RestCloud {
     Rows rows;
     Boundary boundary; /* the simulation's samples with contacts of the cloud's own */
     Dfsph dfsph;
+    bool fits_walls;     /* the points fit the walls: these make no candidates and remove nothing */
     float counted_below; /* y: candidates above lack neighbours and do not count in the mean density */
-    Buffer marks, laid, source, fate;            /* rest_gather.c */
-    Buffer frozen, held;                         /* [points] 1: gets no row; gets one but does not move */
-    Buffer state, constant, sum, density, order; /* rest_select.c */
-    Buffer kept[PARTICLE_FIELD_COUNT + 1];       /* existing water as it was, and its densities */
+    Buffer marks, laid, source, fate; /* rest_gather.c */
+    Buffer frozen, held;              /* [points] 1: gets no row; gets one but does not move */
+    Buffer state, constant, walls, sum, density, order; /* rest_select.c */
+    Buffer kept[PARTICLE_FIELD_COUNT + 1];              /* existing water as it was, and its densities */
 } RestCloud;
 
 struct SkiffSim;
@@ -76,9 +77,9 @@ void rest_cloud_free(RestCloud *cloud);
 /* The stages of rest_fill. */
 bool rest_gather(struct SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err);
 bool rest_select(struct SkiffSim *sim, SkiffFill *fill, Err *err);
-bool rest_settle(struct SkiffSim *sim, SkiffFill *fill, Err *err);
+bool rest_settle(struct SkiffSim *sim, float surface, SkiffFill *fill, Err *err); /* y, m */
 /* The same for the simulation's particles with ids from `first_id` on; all others are held. */
-bool rest_settle_all(struct SkiffSim *sim, uint64_t first_id, SkiffFill *fill, Err *err);
+bool rest_settle_all(struct SkiffSim *sim, float surface, uint64_t first_id, SkiffFill *fill, Err *err);
 /* Sorts the cloud, freezes what is of no kind in `evaluated` (bits 1 << RestKind), and makes rows and
  * boundary terms of the rest. */
 bool rest_search(struct SkiffSim *sim, uint32_t evaluated, Err *err);

@@ -243,18 +243,20 @@ bool rest_gather(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err
     Gather gather = {.sim = sim, .request = request};
     RestCloud *cloud = &sim->rest;
     /* water that fits the walls has a true surface, no air over it */
+    cloud->fits_walls = request->fitted != NULL;
     cloud->counted_below = request->fitted != NULL ? request->surface - sim->kernel.support : INFINITY;
     uint32_t laid;
     if (!make_cells(&gather, err) || !lay_points(&gather, &laid, err))
         return false;
     uint8_t *fate = cloud->fate.data;
     const float(*laid_at)[3] = cloud->laid.data;
-    uint32_t bulk = 0, near = 0;
-#pragma omp parallel for schedule(dynamic, 4096) num_threads(sim->threads) reduction(+ : bulk, near)
+    uint32_t bulk = 0, near = 0, water = 0;
+#pragma omp parallel for schedule(dynamic, 4096) num_threads(sim->threads) reduction(+ : bulk, near, water)
     for (uint32_t i = 0; i < laid; i++) {
         fate[i] = fate_of(&gather, laid_at[i]);
         bulk += fate[i] == BULK;
         near += fate[i] >= IN_CLOUD;
+        water += fate[i] == IN_CLOUD + REST_FLUID || fate[i] == IN_CLOUD + REST_SUPPORT;
     }
     /* the cloud, in its order; then what exists around it */
     cloud->points.count = 0;
@@ -264,7 +266,7 @@ bool rest_gather(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err
     if (!particles_reserve(&cloud->points, near + sim->particles.count, err) ||
         !buffer_reserve(&cloud->frozen, "frozen points", cloud->points.capacity + SLICE, err) ||
         !buffer_reserve(&cloud->held, "held points", cloud->points.capacity + SLICE, err) ||
-        !sim_reserve(sim, sim->particles.count + bulk + near, err))
+        !sim_reserve(sim, sim->particles.count + bulk + water, err))
         return false;
     for (uint32_t i = 0; i < laid; i++)
         if (fate[i] >= IN_CLOUD)
@@ -274,6 +276,6 @@ bool rest_gather(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err
         add_existing(&gather);
     for (uint32_t i = 0; i < laid; i++)
         if (fate[i] == BULK)
-            append(&gather, &sim->particles, i, sim->particles.next_id++, request->birth);
+            append(&gather, &sim->particles, i, sim->particles.next_id, request->birth);
     return true;
 }

@@ -22,7 +22,8 @@ typedef struct Select {
     float unit; /* density of a weight of 1 */
     float own;  /* density of a particle alone */
     uint8_t *state;
-    float *constant;
+    float *constant; /* of what can push points out: solids that they do not fit, existing water */
+    float *walls;    /* of walls that they fit */
     int32_t *sum;
     float *density;
 } Select;
@@ -63,10 +64,13 @@ static RestKind kind_of(const Select *select, uint32_t i) {
 static void add_solids(Select *select) {
     const Boundary *boundary = &select->cloud->boundary;
     memset(select->constant, 0, select->count * sizeof *select->constant);
+    memset(select->walls, 0, select->count * sizeof *select->walls);
     for (uint32_t block = 0; block < select->blocks; block++) {
         const ContactSpan span = boundary->spans[block];
         for (uint32_t c = span.start; c < span.start + span.count; c++)
-            select->constant[boundary->contacts[c].particle] += boundary->contacts[c].weight;
+            (select->cloud->fits_walls && boundary->contacts[c].object == 0
+                 ? select->walls
+                 : select->constant)[boundary->contacts[c].particle] += boundary->contacts[c].weight;
     }
 }
 
@@ -128,7 +132,8 @@ typedef struct DensitySums {
 static DensitySums measure(Select *select) {
     EACH_POINT {
         if (select->state[i] == CANDIDATE)
-            select->density[i] = select->own + select->constant[i] + select->unit * (float)select->sum[i];
+            select->density[i] =
+                select->own + select->constant[i] + select->walls[i] + select->unit * (float)select->sum[i];
     }
     DensitySums sums = {0};
     for (uint32_t i = 0; i < select->count; i++) {
@@ -251,6 +256,7 @@ static bool reserve(Select *select, Err *err) {
     const size_t n = select->count;
     if (!buffer_reserve(&cloud->state, "states of points", n, err) ||
         !buffer_reserve(&cloud->constant, "constant densities", n * sizeof(float), err) ||
+        !buffer_reserve(&cloud->walls, "densities of walls", n * sizeof(float), err) ||
         !buffer_reserve(&cloud->sum, "sums of weights", n * sizeof(int32_t), err) ||
         !buffer_reserve(&cloud->density, "densities of points", n * sizeof(float), err) ||
         !buffer_reserve(&cloud->order, "points to keep", n * sizeof(uint32_t), err) ||
@@ -258,6 +264,7 @@ static bool reserve(Select *select, Err *err) {
         return false;
     select->state = cloud->state.data;
     select->constant = cloud->constant.data;
+    select->walls = cloud->walls.data;
     select->sum = cloud->sum.data;
     select->density = cloud->density.data;
     return true;

@@ -11,6 +11,7 @@
 typedef struct WindowPlace {
     const Shape *walls;
     float shift[3]; /* m */
+    float overlap;  /* m: new water may come in this deep, where the cut through the old has left gaps */
     float old_margin, new_margin,
         deep; /* m; deep: what lies this much deeper in the kept water is not needed */
 } WindowPlace;
@@ -28,7 +29,7 @@ static float depth_in_kept(const WindowPlace *place, const float p[3]) {
 static RestPlace ring_place(const void *user, const float p[3]) {
     const WindowPlace *place = user;
     const float depth = depth_in_kept(place, p);
-    return depth < 0.0f ? REST_IN_WATER : depth < place->deep ? REST_IN_AIR : REST_OUTSIDE;
+    return depth < place->overlap ? REST_IN_WATER : depth < place->deep ? REST_IN_AIR : REST_OUTSIDE;
 }
 
 /* Where the middle of the window should be, world, m. */
@@ -120,6 +121,7 @@ static bool fill_ring(SkiffSim *sim, const WindowPlace *place, Err *err) {
     const SkiffParams params = sim->params;
     sim->params.rest_settle = REST_SETTLE_CANDIDATES;
     sim->params.rest_steps = sim->params.rest_min_steps = params.window_steps;
+    sim->params.rest_target = params.window_target;
     sim->params.rest_time_scale = 1.0f;
     sim->params.rest_retention = 0.8f;
     sim->params.rest_divergence = false;
@@ -136,6 +138,7 @@ bool window_follow(SkiffSim *sim, Err *err) {
     const float support = sim->kernel.support;
     place.old_margin = sim->params.window_old * sim->params.particle_radius;
     place.new_margin = sim->params.window_new * support;
+    place.overlap = sim->params.window_overlap * sim->params.particle_radius;
     place.deep = 2.0f * support;
     if (!move_water(sim, &place, err))
         return false;
