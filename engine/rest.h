@@ -78,9 +78,9 @@ void rest_cloud_free(RestCloud *cloud);
 /* The stages of rest_fill. */
 bool rest_gather(struct SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err);
 bool rest_select(struct SkiffSim *sim, SkiffFill *fill, Err *err);
-bool rest_settle(struct SkiffSim *sim, double birth, SkiffFill *fill, Err *err);
+bool rest_settle(struct SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err);
 /* The same for the simulation's particles with ids from `first_id` on; all others are held. */
-bool rest_settle_all(struct SkiffSim *sim, uint64_t first_id, SkiffFill *fill, Err *err);
+bool rest_settle_all(struct SkiffSim *sim, float surface, uint64_t first_id, SkiffFill *fill, Err *err);
 /* Sorts the cloud, freezes what is of no kind in `evaluated` (bits 1 << RestKind), and makes rows and
  * boundary terms of the rest. */
 bool rest_search(struct SkiffSim *sim, uint32_t evaluated, Err *err);

@@ -20,6 +20,9 @@ static const double FIRST_ALPHA = 0.8, LAST_ALPHA = 0.1;
 /* Calming without limit: nothing that settles moves as it should. m/s^2 */
 static const float NO_LIMIT = 1e3f;
 
+/* r / sqrt(p / rho0): steps of 1.5 are unstable, whatever depth and radius */
+static const float LONGEST = 1.1f;
+
 /* What settles, and with what. */
 typedef struct Settle {
     SkiffSim *sim;
@@ -32,6 +35,7 @@ typedef struct Settle {
     const uint8_t *frozen; /* [particles] 1: no row; or NULL */
     const uint8_t *held;   /* [particles] 1: does not move; or NULL */
     uint32_t active;
+    float surface; /* y, m */
 } Settle;
 
 /* ---- Search ---- */
@@ -130,6 +134,22 @@ static float kept_share(const SkiffParams *params, int step) {
     return (float)(1.0 - FIRST_ALPHA * fall);
 }
 
+/* Length of a step, in steps of the simulation. Without a wish the longest that is stable: where still water
+ * presses with p, a particle out of its place is pushed on or back with a frequency of sqrt(p / rho0) / r
+ * times a number, and explicit steps may be as long as that allows. */
+static float step_scale(const Settle *settle) {
+    const SkiffParams *params = &settle->params;
+    if (params->rest_time_scale > 0.0f)
+        return params->rest_time_scale;
+    float lowest = settle->surface;
+    for (uint32_t i = 0; i < settle->particles->count; i++)
+        lowest = fminf(lowest, settle->particles->position[i][1]);
+    const float depth = fmaxf(settle->surface - lowest, 8.0f * params->particle_radius);
+    const float pressure = -params->gravity[1] * depth; /* p / rho0 */
+    const float longest = LONGEST * params->particle_radius / sqrtf(pressure);
+    return pressure > 0.0f ? fmaxf(longest / params->time_step, 1.0f) : 1.0f;
+}
+
 /* P is p dt^2 / rho0: another time step, another P. */
 static void scale_pressures(Particles *particles, float factor) {
     for (uint32_t i = 0; i < particles->count; i++) {
@@ -159,7 +179,7 @@ static bool search_all(Settle *settle, uint64_t first_id, Err *err) {
 static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, SkiffFill *fill, Err *err) {
     SkiffParams *params = &settle->params;
     const double unit = (double)(params->particle_radius / params->time_step);
-    const float scale = params->rest_time_scale;
+    const float scale = step_scale(settle);
     params->max_density_error = params->rest_density_error;
     params->softening = params->rest_softening;
     params->feedforward = 0.0f;
@@ -219,18 +239,19 @@ static void take_over(SkiffSim *sim, uint32_t keep, double birth, SkiffFill *fil
     points->count = kept;
 }
 
-bool rest_settle(SkiffSim *sim, double birth, SkiffFill *fill, Err *err) {
+bool rest_settle(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err) {
     if (fill->active == 0 || sim->params.rest_steps == 0)
         return true;
     Settle settle = settle_cloud(sim);
     settle.active = fill->active;
+    settle.surface = request->surface;
     /* whoever the active can feel is rim: the others need not be sorted in every step */
-    take_over(sim, 1u << REST_ACTIVE | 1u << REST_RIM | 1u << REST_EXISTING_RIM, birth, fill);
+    take_over(sim, 1u << REST_ACTIVE | 1u << REST_RIM | 1u << REST_EXISTING_RIM, request->birth, fill);
     return dfsph_reserve(&sim->rest.dfsph, sim->rest.points.capacity, 1 + (uint32_t)sim->body_count, err) &&
            run_steps(&settle, search_cloud, 0, fill, err);
 }
 
-bool rest_settle_all(SkiffSim *sim, uint64_t first_id, SkiffFill *fill, Err *err) {
+bool rest_settle_all(SkiffSim *sim, float surface, uint64_t first_id, SkiffFill *fill, Err *err) {
     fill->active = fill->particles;
     if (fill->active == 0)
         return true;
@@ -246,7 +267,8 @@ bool rest_settle_all(SkiffSim *sim, uint64_t first_id, SkiffFill *fill, Err *err
                      .boundary = &sim->boundary,
                      .dfsph = &sim->dfsph,
                      .held = nothing_else ? NULL : sim->rest.held.data,
-                     .active = fill->active};
+                     .active = fill->active,
+                     .surface = surface};
     const bool good = run_steps(&settle, search_all, first_id, fill, err);
     for (uint32_t i = 0; i < sim->particles.count; i++)
         if (sim->particles.id[i] >= first_id)
@@ -319,11 +341,11 @@ bool rest_fill(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *
     const double gathered = timer_ms();
     good = good && rest_select(sim, fill, err);
     const double selected = timer_ms();
-    good = good && (all || rest_settle(sim, request->birth, fill, err));
+    good = good && (all || rest_settle(sim, request, fill, err));
     if (good)
         take_over(sim, 0, request->birth, fill);
     const bool fits = request->fitted != NULL && fill->candidates == 0; /* as it is */
-    good = good && (!all || fits || rest_settle_all(sim, first_id, fill, err));
+    good = good && (!all || fits || rest_settle_all(sim, request->surface, first_id, fill, err));
     if (good)
         show(sim, first_id, all && !fits);
     else

@@ -36,7 +36,7 @@ static void scene_make(Scene *scene) {
     scene->body.name = "cube";
     scene->body.geometry.kind = SKIFF_GEOMETRY_BOX;
     scene->body.geometry.translation[1] = 0.4f;
-    scene->body.geometry.rotation_axis[0] = 1.0f;
+    memcpy(scene->body.geometry.rotation_axis, (float[]){1, 0, 0}, sizeof scene->body.geometry.rotation_axis);
     scene->body.geometry.rotation_angle = 0.785398f;
     scene->def.blocks = &scene->block;
     scene->def.block_count = 1;
