@@ -74,12 +74,15 @@ vec4 see_through(Water water, float ray_length, vec2 bend, float thickness, vec3
     return vec4(mesh_behind ? textureLod(mesh_image, at, 0.0).rgb : empty, under);
 }
 
-// White water: cells of foam that close up as there is more of it. The texels are those of the ripples, read once.
+// White water: cells of foam that close up as there is more of it, and a milky veil of small bubbles between them, without which
+// old foam looks like a net. The texels are those of the ripples, read once.
 float foam_cover(vec2 p, float amount, float level) {
     float coarse = ripple_layer(2, p, level).z, fine = ripple_layer(3, p, level).w;
-    float pattern = 0.58 * coarse + 0.42 * fine;
+    float pattern = 0.50 * coarse + 0.50 * fine;
     float dense = 1.0 - exp(-1.3 * amount);
-    return clamp(smoothstep(0.85 - dense, 2.0 - 1.2 * dense, pattern + 0.25 * dense) * min(1.0, 4.0 * dense), 0.0, 0.95);
+    float cells = smoothstep(0.80 - dense, 2.1 - 1.2 * dense, pattern + 0.25 * dense) * min(1.0, 4.0 * dense);
+    float veil = 0.42 * dense * dense;
+    return clamp(cells + (1.0 - cells) * veil, 0.0, 0.95);
 }
 
 float power_of_64(float x) {

@@ -24,7 +24,7 @@ typedef struct Sea {
     float (*position)[4], (*velocity)[4];
     float *fade, *foam, *field;
     uint64_t *id;
-    float edge[SEA_EDGE_SIZE * SEA_EDGE_SIZE];
+    float edge[SEA_EDGE_SIZE * SEA_EDGE_SIZE], wake[SEA_EDGE_SIZE * SEA_EDGE_SIZE];
     float (*vertices)[3]; /* the boat */
     uint32_t (*triangles)[3];
     uint32_t vertex_count, triangle_count;
@@ -213,16 +213,22 @@ static inline Sea *sea_create(const SeaDef *def) {
     GfxOcean *ocean = &sea->scene.ocean;
     ocean->enabled = true;
     ocean->edge_distance = sea->edge;
+    ocean->foam = sea->wake;
     for (int k = 0; k < 2; k++) {
         ocean->edge_size[k] = SEA_EDGE_SIZE;
         ocean->edge_min[k] = -def->radius;
         ocean->edge_max[k] = def->radius;
+        ocean->foam_size[k] = SEA_EDGE_SIZE;
+        ocean->foam_min[k] = -2.0f * def->radius;
+        ocean->foam_max[k] = 2.0f * def->radius;
     }
     for (int j = 0; j < SEA_EDGE_SIZE; j++)
         for (int i = 0; i < SEA_EDGE_SIZE; i++) {
             float x = def->radius * (2.0f * (float)i / (SEA_EDGE_SIZE - 1) - 1.0f);
             float z = def->radius * (2.0f * (float)j / (SEA_EDGE_SIZE - 1) - 1.0f);
             sea->edge[j * SEA_EDGE_SIZE + i] = def->radius - sqrtf(x * x + z * z);
+            float unit = 2.0f * 1.3f / def->boat_length;
+            sea->wake[j * SEA_EDGE_SIZE + i] = 2.5f * sea_foam_unit(unit * x, unit * z);
         }
     sea->scene.field = (GfxField){0.0f, 3.0f, "speed", "m/s"};
     sea->scene.time = 1.3;

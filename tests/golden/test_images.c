@@ -255,6 +255,8 @@ static void shift_scene(const float shift[3]) {
     for (int k = 0; k < 2; k++) {
         scene->ocean.edge_min[k] -= shift[2 * k];
         scene->ocean.edge_max[k] -= shift[2 * k];
+        scene->ocean.foam_min[k] -= shift[2 * k];
+        scene->ocean.foam_max[k] -= shift[2 * k];
     }
 }
 

@@ -26,10 +26,16 @@ static void chase_starts_astern(void **unused) {
     GfxCameraDef def = gfx_camera_default(GFX_CAMERA_CHASE);
     GfxCameraState state = {0};
     GfxPose pose = pose_at(10, 1, 20, 0.5 * pi); /* the bow points to +z */
+    def.azimuth = 0;
     GfxCameraView view = gfx_camera_update(&def, &state, &pose, 0);
     near3(view.eye, 10, 1 + def.height, 20 - def.distance, 1e-12);
     near3(view.target, 10, 1 + def.look_up, 20, 1e-12);
     near3(view.up, 0, 1, 0, 0);
+    /* Off the line astern: for a bow to +z, from -z towards +x. */
+    def.azimuth = 0.5 * pi;
+    state = (GfxCameraState){0};
+    view = gfx_camera_update(&def, &state, &pose, 0);
+    near3(view.eye, 10 + def.distance, 1 + def.height, 20, 1e-12);
 }
 
 static void other_bows_are_known(void **unused) {
@@ -38,6 +44,7 @@ static void other_bows_are_known(void **unused) {
     GfxCameraState state = {0};
     GfxPose pose = pose_at(0, 0, 0, 0);
     memcpy(def.forward, (double[3]){0, 0, -2}, sizeof def.forward);
+    def.azimuth = 0;
     near3(gfx_camera_update(&def, &state, &pose, 0).eye, 0, def.height, def.distance, 1e-12);
 }
 
@@ -57,6 +64,7 @@ static void constant_speed_has_no_lag(void **unused) {
 /* Distance of the eye from where it would be without smoothing, 0.4 s after a leap of 1 m to the side. */
 static double after_leap(int rate, double smoothing) {
     GfxCameraDef def = gfx_camera_default(GFX_CAMERA_CHASE);
+    def.azimuth = 0;
     GfxCameraState state = {0};
     def.smoothing = smoothing;
     GfxPose pose = pose_at(0, 0, 0, 0);
