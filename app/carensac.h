@@ -21,6 +21,8 @@ enum {
     CARENSAC_DENSITY,       /* of the candidates after selection, mean, kg/m^3 */
     CARENSAC_DENSITY_ERROR, /* its distance from the target, % of the target */
     CARENSAC_SPREAD,        /* of their densities about the target, % of the target */
+    CARENSAC_FREE_MEAN,     /* speeds in the free steps after the last run's fill, worst step, cm/s; table1 */
+    CARENSAC_FREE_MAX,
     CARENSAC_FILL_COLUMNS
 };
 
@@ -77,6 +79,13 @@ typedef struct CarensacVariant {
 
 CarensacVariant carensac_variant(int fig2_row);
 
+/* table1 has each of its experiments by the paper's method and then by the engine's defaults; fig4c its
+ * one. */
+typedef enum CarensacMethod { CARENSAC_PAPER, CARENSAC_DEFAULTS, CARENSAC_METHOD_COUNT } CarensacMethod;
+
+/* How the paper and its authors' code stabilise, with no calming: the last is no part of theirs. */
+void carensac_set_paper_method(SkiffParams *params);
+
 /* A set-up. `def` points into it: do not copy. */
 typedef struct CarensacSetup {
     SkiffDef def;
@@ -89,11 +98,18 @@ typedef struct CarensacSetup {
     char mesh[4096]; /* file that the set-up wrote, to be removed by the caller; "" : none */
 } CarensacSetup;
 
-/* The rows of table1, in its order. */
-enum { CARENSAC_FLUID_FLUID, CARENSAC_FLUID_BOUNDARY, CARENSAC_PYRAMID, CARENSAC_FLOATING_CUBE };
+/* The experiments of table1, in its order. */
+enum {
+    CARENSAC_FLUID_FLUID,
+    CARENSAC_FLUID_BOUNDARY,
+    CARENSAC_PYRAMID,
+    CARENSAC_FLOATING_CUBE,
+    CARENSAC_FILL_COUNT
+};
 
-/* Set-up of a row of table1; fig2 and fig4c use the floating cube. Files it needs are written to `folder`. */
-bool carensac_set_up(int table1_row, const char *folder, CarensacSetup *setup, Err *err);
+/* Set-up of an experiment of table1; fig2 and fig4c use the floating cube. Files it needs are written to
+ * `folder`. */
+bool carensac_set_up(int experiment, const char *folder, CarensacSetup *setup, Err *err);
 /* Set-up of fig5: a wedge that falls into a corridor. */
 void carensac_set_up_wedge(CarensacSetup *setup);
 

@@ -225,6 +225,25 @@ static const Option rest_show_options[] = {
     OPTION_ROW_HELP,
 };
 
+static const Option rest_fill_options[] = {
+    {0, "free-steps", "N", OPTION_INTEGER, AT(free_steps), .min = 0, .max = 1e6,
+     .help = "Steps to watch the water after the fill (default 100)"},
+    OPTION_ROW_JSON,
+    OPTION_ROWS_ENGINE,
+    OPTION_ROW_SET,
+    OPTION_ROW_HELP,
+};
+
+static const Option reproduce_options[] = {
+    {0, "runs", "N", OPTION_INTEGER, AT(runs), .min = 1, .max = 10000,
+     .help = "Fills of each row of table1 and fig2, each with another offset (default 51, as the paper)"},
+    {'o', "output", "DIR", OPTION_TEXT, AT(output), .help = "Folder for report.html and the CSV files"},
+    {0, "json", NULL, OPTION_FLAG, AT(json), .help = "One line of JSON for each row in place of the tables"},
+    OPTION_ROWS_ENGINE,
+    {'q', "quiet", NULL, OPTION_FLAG, AT(quiet), .help = "No progress on stderr"},
+    OPTION_ROW_HELP,
+};
+
 static const Option render_options[] = {
     {'o', "output", "OUT", OPTION_TEXT, AT(output),
      .help = "Folder for the results (default DIR/redrawn, or DIR/export)"},
@@ -300,6 +319,26 @@ static const Command commands[] = {
      "  skiff rest show\n"
      "  skiff rest show block.skiff --json\n",
      rest_show_options, COUNT(rest_show_options), rest_show_command},
+    {"rest fill", "scene", true, "SCENE", "Fill a scene with water at rest and see how still it stands",
+     "Fills what the scene fills at its start with \"fill\": \"rest\", lets the water go for some steps and\n"
+     "prints counts, densities and times of the fill (of the last block, where there are several) and "
+     "speeds\n"
+     "and drift afterwards.\n",
+     "  skiff rest fill assets/scenes/settling-tank.json --set FluidBlocks[0].fill=rest\n"
+     "  skiff rest fill scene.json --free-steps 300 --json --set restSettle=candidates\n",
+     rest_fill_options, COUNT(rest_fill_options), rest_fill_command},
+    {"reproduce carensac2023", "experiment", false, "[EXPERIMENT]",
+     "Run the experiments of a paper and set our figures beside its own",
+     "Fluid initialization and dynamic window for SPH simulation (Carensac, Pronost, Bouakaz 2023):\n"
+     "  table1   four fills with water at rest: counts, times, iterations, speeds afterwards\n"
+     "  fig2     rules of the selection, over their parameters\n"
+     "  fig4c    a floating cube for 3 s after a fill\n"
+     "  all      all of these (default)\n"
+     "Rows with the paper's name follow its method; those named \"defaults\" are what this program does by\n"
+     "itself.\n",
+     "  skiff reproduce carensac2023 table1 --runs 5\n"
+     "  skiff reproduce carensac2023 all -o out/carensac2023\n",
+     reproduce_options, COUNT(reproduce_options), reproduce_carensac_command},
     {"render", "folder of a run", true, "DIR", "Draw a finished run again, or export its particles",
      "Reads what `skiff run --save-particles FPS -o DIR` left in DIR: a frame for each saved moment, with\n"
      "another look, camera or size. --export needs no OpenGL.\n",
@@ -535,6 +574,8 @@ static CliArgs default_args(void) {
                      .settle = 1.2,
                      .steps = 20,
                      .windows = 5,
+                     .free_steps = 100,
+                     .runs = 51,
                      .edge = 12,
                      .seed = 1,
                      .min = {NAN, NAN, NAN},

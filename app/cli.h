@@ -35,6 +35,8 @@ typedef struct CliArgs {
     double edge; /* rest make, d */
     int seed;
     double min[3], max[3]; /* rest cut, m; NaN: not given */
+    int free_steps;        /* rest fill */
+    int runs;              /* reproduce */
     bool help;
 } CliArgs;
 

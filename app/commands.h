@@ -14,5 +14,7 @@ bool profile_command(const CliArgs *args, Err *err);
 bool rest_make_command(const CliArgs *args, Err *err);
 bool rest_cut_command(const CliArgs *args, Err *err);
 bool rest_show_command(const CliArgs *args, Err *err);
+bool rest_fill_command(const CliArgs *args, Err *err);
+bool reproduce_carensac_command(const CliArgs *args, Err *err);
 
 #endif

@@ -1,5 +1,6 @@
 /* skiff rest: water at rest as points, which shapes are filled from: makes a periodic tile, cuts a block out
- * of a run, shows how good either is. The engine does the work; this file asks and prints. */
+ * of a run, shows how good either is; fills a scene and shows how still it stands. The engine does the work;
+ * this file asks and prints. */
 #include "commands.h"
 
 #include "json_text.h"
@@ -11,13 +12,29 @@
 #include <stdio.h>
 #include <string.h>
 
-/* ---- Quality ---- */
-
-/* One figure of the table and the JSON line. */
+/* One figure of a table and its JSON line. */
 typedef struct Figure {
     const char *key, *label, *unit;
     double value;
 } Figure;
+
+static void put_figures(json_t *line, const Figure *figures, int count) {
+    for (int i = 0; i < count; i++)
+        json_object_set_new(line, figures[i].key, json_text_float((float)figures[i].value));
+}
+
+static void print_line(json_t *line) {
+    json_text_print(stdout, line, -1);
+    putchar('\n');
+    json_decref(line);
+}
+
+static void print_figures(const Figure *figures, int count) {
+    for (int i = 0; i < count; i++)
+        printf("  %-44s %12.6g %s\n", figures[i].label, figures[i].value, figures[i].unit);
+}
+
+/* ---- Quality ---- */
 
 enum { FIGURE_COUNT = 16 };
 
@@ -48,11 +65,8 @@ static void print_json(const SkiffTileInfo *info, const SkiffTileQuality *qualit
     json_object_set_new(line, "kind", json_string(info->periodic ? "tile" : "block"));
     json_object_set_new(line, "points", json_integer(info->count));
     json_object_set_new(line, "measured", json_integer(quality->count));
-    for (int i = 0; i < FIGURE_COUNT; i++)
-        json_object_set_new(line, figures[i].key, json_text_float((float)figures[i].value));
-    json_text_print(stdout, line, -1);
-    putchar('\n');
-    json_decref(line);
+    put_figures(line, figures, FIGURE_COUNT);
+    print_line(line);
 }
 
 static bool print_quality(const SkiffTile *tile, bool as_json, Err *err) {
@@ -70,8 +84,7 @@ static bool print_quality(const SkiffTile *tile, bool as_json, Err *err) {
     if (quality.count != info.count)
         printf(", %u of them with all their neighbours", quality.count);
     printf("\n\n");
-    for (int i = 0; i < FIGURE_COUNT; i++)
-        printf("  %-40s %12.6g %s\n", figures[i].label, figures[i].value, figures[i].unit);
+    print_figures(figures, FIGURE_COUNT);
     return true;
 }
 
@@ -134,6 +147,95 @@ bool rest_cut_command(const CliArgs *args, Err *err) {
     SkiffSim *sim = scene_start(scene, args->threads, SKIFF_SIMD_AUTO, err);
     bool good = sim && skiff_load(sim, state_path, err) && find_box(args, sim, min, max, err) &&
                 finish_tile(skiff_tile_cut(sim, min, max, err), args, err);
+    skiff_destroy(sim);
+    scene_free(scene);
+    return good;
+}
+
+/* ---- Filling ---- */
+
+/* What a fill was and what the water did when it was let go. */
+typedef struct Filled {
+    SkiffFill fill;
+    uint32_t particles;
+    int free_steps;
+    double mean_speed, max_speed; /* m/s, of the worst step */
+    double drift;                 /* of the level, d */
+} Filled;
+
+static double mean_height(const SkiffSim *sim) {
+    const SkiffParticles particles = skiff_particles(sim);
+    double sum = 0;
+    for (uint32_t i = 0; i < particles.count; i++)
+        sum += (double)particles.position[i][1];
+    return particles.count > 0 ? sum / particles.count + particles.origin[1] : 0;
+}
+
+static bool let_go(SkiffSim *sim, int steps, Filled *filled, Err *err) {
+    const double before = mean_height(sim);
+    for (int step = 0; step < steps; step++) {
+        if (!skiff_step(sim, err))
+            return false;
+        filled->mean_speed = fmax(filled->mean_speed, skiff_stats(sim)->mean_speed);
+        filled->max_speed = fmax(filled->max_speed, skiff_stats(sim)->max_speed);
+    }
+    /* between upright walls the level moves twice as far as the mean height */
+    filled->drift = (mean_height(sim) - before) / (double)skiff_params(sim)->particle_radius;
+    filled->free_steps = steps;
+    return true;
+}
+
+static void print_filled(const Filled *filled, bool as_json) {
+    const SkiffFill *fill = &filled->fill;
+    const Figure figures[] = {
+        {"particles", "particles", "", filled->particles},
+        {"candidates", "near walls, bodies and water, at first", "", fill->candidates},
+        {"selected", "the same after the selection", "", fill->selected},
+        {"passes", "passes of the selection", "", fill->passes},
+        {"density_mean", "their density, mean", "rest density", fill->density_mean},
+        {"density_sd_percent", "their density, standard deviation", "%", 100 * fill->density_spread},
+        {"density_rms_percent", "the same about the target", "%", 100 * fill->density_rms},
+        {"settled", "particles that settled", "", fill->active},
+        {"settle_steps", "steps of settling", "", fill->steps},
+        {"settle_v_mean", "speed in the last of them, mean", "m/s", fill->mean_speed},
+        {"settle_v_max", "speed in the last of them, largest", "m/s", fill->max_speed},
+        {"load_ms", "time to lay points", "ms", fill->load_ms},
+        {"select_ms", "time to select", "ms", fill->select_ms},
+        {"settle_ms", "time to settle", "ms", fill->settle_ms},
+        {"free_steps", "free steps", "", filled->free_steps},
+        {"v_mean", "mean speed, worst free step", "m/s", filled->mean_speed},
+        {"v_max", "largest speed, worst free step", "m/s", filled->max_speed},
+        {"level_drift_d", "level's drift over the free steps", "d", filled->drift},
+    };
+    enum { COUNT = sizeof figures / sizeof *figures };
+    if (!as_json) {
+        print_figures(figures, COUNT);
+        return;
+    }
+    json_t *line = json_object();
+    put_figures(line, figures, COUNT);
+    print_line(line);
+}
+
+bool rest_fill_command(const CliArgs *args, Err *err) {
+    Scene *scene = scene_load(args->scene, args->edits, args->edit_count, err);
+    if (!scene)
+        return false;
+    SkiffSim *sim = scene_start(scene, args->threads, (SkiffSimd)args->simd, err);
+    Filled filled = {0};
+    bool good = sim != NULL;
+    if (good) {
+        filled.fill = *skiff_fill(sim);
+        filled.particles = skiff_particles(sim).count;
+        good = filled.fill.particles > 0 ||
+               err_set(err, ERR_INPUT,
+                       "%s: nothing in it is filled with water at rest at the start; a block is with --set "
+                       "FluidBlocks[0].fill=rest",
+                       args->scene);
+    }
+    good = good && let_go(sim, args->free_steps, &filled, err);
+    if (good)
+        print_filled(&filled, args->json);
     skiff_destroy(sim);
     scene_free(scene);
     return good;

@@ -6,6 +6,7 @@
 #include "base/log.h"
 
 #include <math.h>
+#include <stdio.h>
 
 double block_particles(const SkiffBlockDef *def, float spacing, double counts[3]) {
     double total = 1.0;
@@ -77,8 +78,8 @@ static RestPlace block_place(const void *user, const float p[3]) {
     return REST_IN_WATER;
 }
 
-static bool emit_rest(SkiffSim *sim, int index, uint32_t *emitted, Err *err) {
-    const SkiffBlockDef *def = &sim->blocks[index].def;
+static bool emit_rest(SkiffSim *sim, const SkiffBlockDef *def, const char *path, uint32_t *emitted,
+                      Err *err) {
     RestBlock block;
     RestRequest request = {.place = block_place, .user = &block, .birth = sim->time};
     for (int k = 0; k < 3; k++) {
@@ -88,17 +89,25 @@ static bool emit_rest(SkiffSim *sim, int index, uint32_t *emitted, Err *err) {
     }
     request.bounds = block.bounds;
     request.surface = block.bounds.max[1];
-    const uint32_t before = sim->particles.count;
-    if (!rest_fill(sim, &request, &sim->fill, err)) {
-        err_prefix(err, "FluidBlocks[%d]", index);
+    const uint64_t first_id = sim->particles.next_id;
+    SkiffFill fill;
+    if (!rest_fill(sim, &request, &fill, err)) {
+        err_prefix(err, "%s", path);
         return false;
     }
-    if (sim->particles.count == before)
-        return err_add(err, ERR_INPUT, "FluidBlocks[%d]: there is no room for water in it", index);
-    for (uint32_t i = before; i < sim->particles.count; i++)
-        memcpy(sim->particles.velocity[i], def->velocity, sizeof def->velocity);
-    *emitted += sim->particles.count - before;
+    if (fill.particles == 0)
+        return err_add(err, ERR_INPUT, "%s: there is no room for water in it", path);
+    sim->fill = fill;
+    for (uint32_t i = 0; i < sim->particles.count; i++) /* a fill sorts: the new ones are anywhere */
+        if (sim->particles.id[i] >= first_id)
+            memcpy(sim->particles.velocity[i], def->velocity, sizeof def->velocity);
+    *emitted += fill.particles;
     return true;
+}
+
+bool skiff_fill_block(SkiffSim *sim, const SkiffBlockDef *block, Err *err) {
+    uint32_t emitted = 0;
+    return emit_rest(sim, block, "the block", &emitted, err);
 }
 
 /* ---- Lattices ---- */
@@ -158,7 +167,9 @@ bool block_emit(SkiffSim *sim, uint32_t *emitted, Err *err) {
         EmitBlock *block = &sim->blocks[k];
         while (good && block->done < block->def.repeat &&
                block->def.time + block->done * block->def.period <= sim->time + 1e-9) {
-            good = block->def.fill == SKIFF_FILL_REST ? emit_rest(sim, k, emitted, err)
+            char path[32];
+            snprintf(path, sizeof path, "FluidBlocks[%d]", k);
+            good = block->def.fill == SKIFF_FILL_REST ? emit_rest(sim, &block->def, path, emitted, err)
                                                       : emit_lattice(sim, k, emitted, err);
             block->done++;
         }

@@ -109,6 +109,12 @@ bool body_make(const SkiffBodyDef *def, const char *path, Body *body, Err *err) 
         return err_add(err, ERR_INPUT, "%s: no memory", path);
     }
     memcpy(body->name, def->name, length);
+    for (uint32_t v = 0; v < body->mesh.vertex_count; v++) {
+        double length_sq = 0.0;
+        for (int k = 0; k < 3; k++)
+            length_sq += (double)body->mesh.vertices[v][k] * (double)body->mesh.vertices[v][k];
+        body->reach = fmax(body->reach, sqrt(length_sq));
+    }
     body_prepare(body, -INFINITY);
     return true;
 }

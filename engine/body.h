@@ -14,6 +14,7 @@ typedef struct Body {
     uint32_t free_axes;
     double release_time;
     double mass, volume;  /* kg, m^3 */
+    double reach;         /* m, from the centre of mass to the farthest vertex */
     double inertia[3][3]; /* kg m^2, body axes */
     double position[3];   /* centre of mass, world */
     double rotation[4];   /* x y z w */

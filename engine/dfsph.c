@@ -153,6 +153,21 @@ static void apply_pressure(Dfsph *dfsph, const DfsphProblem *problem, const floa
     apply_transpose(dfsph, problem, &job);
 }
 
+/* The fluid's velocities after the solve. What is held is kept out by way of a copy: the passes write whole
+ * blocks. */
+static void change_velocities(Dfsph *dfsph, const DfsphProblem *problem, const float *p) {
+    Float4 *velocity = problem->particles->velocity;
+    if (problem->held == NULL) {
+        apply_pressure(dfsph, problem, p, velocity);
+        return;
+    }
+    apply_pressure(dfsph, problem, p, dfsph->guess);
+#pragma omp parallel for schedule(static) num_threads(problem->threads)
+    for (uint32_t i = 0; i < problem->particles->count; i++)
+        if (!problem->held[i])
+            memcpy(velocity[i], dfsph->guess[i], sizeof(Float4));
+}
+
 /* Velocities of the bodies after the pressure so far. */
 static void body_velocities(const Dfsph *dfsph, const DfsphProblem *problem, double (*velocities)[6]) {
     const double scale = 1.0 / (double)problem->params->time_step;
@@ -417,7 +432,7 @@ SolveResult dfsph_solve(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kin
                                                             : solve_jacobi(dfsph, problem, p, limits);
     if (kind == SOLVE_DENSITY)
         predict_density(dfsph, problem);
-    apply_pressure(dfsph, problem, p, problem->particles->velocity);
+    change_velocities(dfsph, problem, p);
     if (dfsph->moving) {
         const double scale = 1.0 / (double)params->time_step;
         for (int b = 0; b < problem->body_count; b++)

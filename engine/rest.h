@@ -31,7 +31,8 @@ enum { REST_SCHEDULE_CONSTANT, REST_SCHEDULE_PRINTED };
 enum { REST_SETTLE_ALL, REST_SETTLE_CANDIDATES };
 
 /* Where water shall be. All of it window-local. */
-typedef enum RestPlace { REST_OUTSIDE, REST_IN_WATER, REST_IN_AIR } RestPlace;
+/* STILL: water that is known to touch nothing it does not fit. */
+typedef enum RestPlace { REST_OUTSIDE, REST_IN_WATER, REST_STILL, REST_IN_AIR } RestPlace;
 
 /* Water at rest that already fits the walls: what a window refills itself from. */
 typedef struct RestFitted {
@@ -64,6 +65,7 @@ typedef struct RestCloud {
     Buffer marks, laid, source, fate; /* rest_gather.c */
     Buffer frozen, held;              /* [points] 1: gets no row; gets one but does not move */
     Buffer state, constant, walls, sum, density, order; /* rest_select.c */
+    Buffer kept[PARTICLE_FIELD_COUNT + 1];              /* existing water as it was, and its densities */
 } RestCloud;
 
 struct SkiffSim;
@@ -76,9 +78,9 @@ void rest_cloud_free(RestCloud *cloud);
 /* The stages of rest_fill. */
 bool rest_gather(struct SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err);
 bool rest_select(struct SkiffSim *sim, SkiffFill *fill, Err *err);
-bool rest_settle(struct SkiffSim *sim, SkiffFill *fill, Err *err);
+bool rest_settle(struct SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err);
 /* The same for the simulation's particles with ids from `first_id` on; all others are held. */
-bool rest_settle_all(struct SkiffSim *sim, uint64_t first_id, SkiffFill *fill, Err *err);
+bool rest_settle_all(struct SkiffSim *sim, float surface, uint64_t first_id, SkiffFill *fill, Err *err);
 /* Sorts the cloud, freezes what is of no kind in `evaluated` (bits 1 << RestKind), and makes rows and
  * boundary terms of the rest. */
 bool rest_search(struct SkiffSim *sim, uint32_t evaluated, Err *err);

@@ -158,7 +158,9 @@ static uint8_t fate_of(const Gather *gather, const float p[3]) {
         return DROPPED;
     if (place == REST_IN_AIR)
         return IN_CLOUD + (mark & NEAR ? REST_AIR : REST_SUPPORT_AIR);
-    return mark & NEAR ? IN_CLOUD + REST_FLUID : mark & AROUND ? IN_CLOUD + REST_SUPPORT : BULK;
+    return mark & NEAR && place != REST_STILL ? IN_CLOUD + REST_FLUID
+           : mark & AROUND                    ? IN_CLOUD + REST_SUPPORT
+                                              : BULK;
 }
 
 /* Positions of all points that may matter, and which point of the source each is. */

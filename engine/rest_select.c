@@ -74,6 +74,11 @@ static void add_solids(Select *select) {
     }
 }
 
+/* What water up to a plane gives a point on the plane, with the point's own share. Air farther in stands
+ * where existing water is, and would lend what it has to give once more: the interface would end up short of
+ * water. */
+static const float HALF_SPACE = 0.5f;
+
 static void find_candidates(Select *select) {
     /* half a radius is an eighth of the support; q = 1/8 in the kernel */
     const int32_t too_close = (int32_t)(32767.0f * (1.0f - 6.0f / 64.0f * (1.0f - 1.0f / 8.0f)));
@@ -92,7 +97,8 @@ static void find_candidates(Select *select) {
             closest = row[k].weight > closest ? row[k].weight : closest;
         }
         select->constant[i] += select->unit * (float)existing;
-        if (closest > too_close || select->constant[i] > select->params->rest_max_constant)
+        const bool taken = kind == REST_AIR && select->unit * (float)existing > HALF_SPACE;
+        if (closest > too_close || taken || select->constant[i] > select->params->rest_max_constant)
             select->state[i] = GONE;
         else if (kind == REST_FLUID && select->constant[i] > 0.0f)
             select->state[i] = CANDIDATE;

@@ -20,6 +20,9 @@ static const double FIRST_ALPHA = 0.8, LAST_ALPHA = 0.1;
 /* Calming without limit: nothing that settles moves as it should. m/s^2 */
 static const float NO_LIMIT = 1e3f;
 
+/* r / sqrt(p / rho0): steps of 1.5 are unstable, whatever depth and radius */
+static const float LONGEST = 1.1f;
+
 /* What settles, and with what. */
 typedef struct Settle {
     SkiffSim *sim;
@@ -32,6 +35,7 @@ typedef struct Settle {
     const uint8_t *frozen; /* [particles] 1: no row; or NULL */
     const uint8_t *held;   /* [particles] 1: does not move; or NULL */
     uint32_t active;
+    float surface; /* y, m */
 } Settle;
 
 /* ---- Search ---- */
@@ -130,6 +134,22 @@ static float kept_share(const SkiffParams *params, int step) {
     return (float)(1.0 - FIRST_ALPHA * fall);
 }
 
+/* Length of a step, in steps of the simulation. Without a wish the longest that is stable: where still water
+ * presses with p, a particle out of its place is pushed on or back with a frequency of sqrt(p / rho0) / r
+ * times a number, and explicit steps may be as long as that allows. */
+static float step_scale(const Settle *settle) {
+    const SkiffParams *params = &settle->params;
+    if (params->rest_time_scale > 0.0f)
+        return params->rest_time_scale;
+    float lowest = settle->surface;
+    for (uint32_t i = 0; i < settle->particles->count; i++)
+        lowest = fminf(lowest, settle->particles->position[i][1]);
+    const float depth = fmaxf(settle->surface - lowest, 8.0f * params->particle_radius);
+    const float pressure = -params->gravity[1] * depth; /* p / rho0 */
+    const float longest = LONGEST * params->particle_radius / sqrtf(pressure);
+    return pressure > 0.0f ? fmaxf(longest / params->time_step, 1.0f) : 1.0f;
+}
+
 /* P is p dt^2 / rho0: another time step, another P. */
 static void scale_pressures(Particles *particles, float factor) {
     for (uint32_t i = 0; i < particles->count; i++) {
@@ -159,7 +179,7 @@ static bool search_all(Settle *settle, uint64_t first_id, Err *err) {
 static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, SkiffFill *fill, Err *err) {
     SkiffParams *params = &settle->params;
     const double unit = (double)(params->particle_radius / params->time_step);
-    const float scale = params->rest_time_scale;
+    const float scale = step_scale(settle);
     params->max_density_error = params->rest_density_error;
     params->softening = params->rest_softening;
     params->feedforward = 0.0f;
@@ -195,11 +215,17 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
     return true;
 }
 
-/* The cloud's new water joins the simulation's. */
-static void take_over(SkiffSim *sim, double birth, SkiffFill *fill) {
-    const Particles *points = &sim->rest.points;
+/* The cloud's new water joins the simulation's; what the stabilisation needs stays in the cloud as well as
+ * `keep` (bits 1 << RestKind) says, and joins later. */
+static void take_over(SkiffSim *sim, uint32_t keep, double birth, SkiffFill *fill) {
+    Particles *points = &sim->rest.points;
+    uint32_t kept = 0, *order = sim->rest.order.data;
     for (uint32_t i = 0; i < points->count; i++) {
         const RestKind kind = rest_kind(points->id[i]);
+        if (keep & 1u << kind) {
+            order[kept++] = i;
+            continue;
+        }
         if (kind == REST_EXISTING || kind == REST_EXISTING_RIM)
             continue;
         const uint32_t to =
@@ -208,18 +234,24 @@ static void take_over(SkiffSim *sim, double birth, SkiffFill *fill) {
         sim->particles.pressure_divergence[to] = points->pressure_divergence[i];
         fill->particles++;
     }
+    if (kept > 0)
+        particles_permute(points, order, kept, sim->threads);
+    points->count = kept;
 }
 
-bool rest_settle(SkiffSim *sim, SkiffFill *fill, Err *err) {
-    if (fill->active == 0)
+bool rest_settle(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err) {
+    if (fill->active == 0 || sim->params.rest_steps == 0)
         return true;
     Settle settle = settle_cloud(sim);
     settle.active = fill->active;
+    settle.surface = request->surface;
+    /* whoever the active can feel is rim: the others need not be sorted in every step */
+    take_over(sim, 1u << REST_ACTIVE | 1u << REST_RIM | 1u << REST_EXISTING_RIM, request->birth, fill);
     return dfsph_reserve(&sim->rest.dfsph, sim->rest.points.capacity, 1 + (uint32_t)sim->body_count, err) &&
            run_steps(&settle, search_cloud, 0, fill, err);
 }
 
-bool rest_settle_all(SkiffSim *sim, uint64_t first_id, SkiffFill *fill, Err *err) {
+bool rest_settle_all(SkiffSim *sim, float surface, uint64_t first_id, SkiffFill *fill, Err *err) {
     fill->active = fill->particles;
     if (fill->active == 0)
         return true;
@@ -235,7 +267,8 @@ bool rest_settle_all(SkiffSim *sim, uint64_t first_id, SkiffFill *fill, Err *err
                      .boundary = &sim->boundary,
                      .dfsph = &sim->dfsph,
                      .held = nothing_else ? NULL : sim->rest.held.data,
-                     .active = fill->active};
+                     .active = fill->active,
+                     .surface = surface};
     const bool good = run_steps(&settle, search_all, first_id, fill, err);
     for (uint32_t i = 0; i < sim->particles.count; i++)
         if (sim->particles.id[i] >= first_id)
@@ -243,33 +276,80 @@ bool rest_settle_all(SkiffSim *sim, uint64_t first_id, SkiffFill *fill, Err *err
     return good;
 }
 
-/* Takes the new particles out again, in a fill that failed. */
-static void undo(SkiffSim *sim, uint64_t first_id) {
-    uint32_t kept = 0, *order = sim->rest.source.data;
-    for (uint32_t i = 0; i < sim->particles.count; i++)
-        if (sim->particles.id[i] < first_id)
-            order[kept++] = i;
-    particles_permute(&sim->particles, order, kept, sim->threads);
+/* ---- The fill ---- */
+
+/* What a fill that fails has to give back. Only settling all of the water touches what exists: it sorts it.
+ */
+static bool keep_existing(SkiffSim *sim, Err *err) {
+    const Particles *particles = &sim->particles;
+    for (int f = 0; f <= PARTICLE_FIELD_COUNT; f++) {
+        const bool field = f < PARTICLE_FIELD_COUNT;
+        const Buffer *from = field ? &particles->front[f] : &sim->rows.density;
+        const size_t size = particles->count * (field ? particle_fields[f].size : sizeof(float));
+        if (!buffer_reserve(&sim->rest.kept[f], "water kept during a fill", size, err))
+            return false;
+        memcpy(sim->rest.kept[f].data, from->data, size);
+    }
+    return true;
+}
+
+/* `kept`: the fill may have sorted what exists; else it stands before what is new, as it did. */
+static void undo(SkiffSim *sim, uint32_t count, uint64_t first_id, bool kept) {
+    Particles *particles = &sim->particles;
+    particles->count = count;
+    particles->next_id = first_id;
+    for (int f = 0; f < PARTICLE_FIELD_COUNT; f++) {
+        const size_t size = particle_fields[f].size, used = count * size;
+        if (kept)
+            memcpy(particles->front[f].data, sim->rest.kept[f].data, used);
+        memset((char *)particles->front[f].data + used, 0,
+               (particles->capacity + (size_t)SLICE) * size - used);
+    }
+    if (kept)
+        memcpy(sim->rows.density.data, sim->rest.kept[PARTICLE_FIELD_COUNT].data, count * sizeof(float));
+}
+
+/* What is shown until the next step: the pressures of the fill; densities only where it came by them. */
+static void show(SkiffSim *sim, uint64_t first_id, bool all) {
+    float *density = sim->rows.density.data;
+    for (uint32_t i = 0; !all && i < sim->particles.count; i++)
+        if (sim->particles.id[i] >= first_id)
+            density[i] = 0.0f;
+    sim_add_pressures(sim);
+}
+
+static bool check_tile(SkiffSim *sim, Err *err) {
+    if (sim->tile.count == 0 && !tile_load_default(&sim->tile, err))
+        return false;
+    const double own = (double)sim->params.volume_factor, needed = sim->tile.volume_factor;
+    return fabs(own - needed) < 1e-6 * needed ||
+           err_set(err, ERR_INPUT,
+                   "Configuration.volumeFactor: %g, but filling with water at rest needs %g: its points are "
+                   "at rest with that",
+                   own, needed);
 }
 
 bool rest_fill(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err) {
     *fill = (SkiffFill){0};
     const uint64_t first_id = sim->particles.next_id;
+    const uint32_t count = sim->particles.count;
     const bool all = sim->params.rest_settle == REST_SETTLE_ALL;
     const double start = timer_ms();
-    if (request->fitted == NULL && sim->tile.count == 0 && !tile_load_default(&sim->tile, err))
+    if ((request->fitted == NULL && !check_tile(sim, err)) || (all && count > 0 && !keep_existing(sim, err)))
         return false;
     bool good = rest_gather(sim, request, fill, err);
     const double gathered = timer_ms();
     good = good && rest_select(sim, fill, err);
     const double selected = timer_ms();
-    good = good && (all || rest_settle(sim, fill, err));
+    good = good && (all || rest_settle(sim, request, fill, err));
     if (good)
-        take_over(sim, request->birth, fill);
-    good = good && (!all || (request->fitted != NULL && fill->candidates == 0) ||
-                    rest_settle_all(sim, first_id, fill, err));
-    if (!good)
-        undo(sim, first_id);
+        take_over(sim, 0, request->birth, fill);
+    const bool fits = request->fitted != NULL && fill->candidates == 0; /* as it is */
+    good = good && (!all || fits || rest_settle_all(sim, request->surface, first_id, fill, err));
+    if (good)
+        show(sim, first_id, all && !fits);
+    else
+        undo(sim, count, first_id, all && count > 0);
     fill->load_ms = gathered - start;
     fill->select_ms = selected - gathered;
     fill->settle_ms = timer_ms() - selected;
@@ -288,4 +368,6 @@ void rest_cloud_free(RestCloud *cloud) {
                          &cloud->walls,  &cloud->sum,  &cloud->density, &cloud->order};
     for (size_t b = 0; b < sizeof buffers / sizeof *buffers; b++)
         buffer_free(buffers[b]);
+    for (int f = 0; f <= PARTICLE_FIELD_COUNT; f++)
+        buffer_free(&cloud->kept[f]);
 }

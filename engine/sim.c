@@ -347,6 +347,7 @@ bool sim_reserve(SkiffSim *sim, uint32_t capacity, Err *err) {
            boundary_reserve(&sim->boundary, capacity, sim->body_count, err) &&
            dfsph_reserve(&sim->dfsph, capacity, 1 + (uint32_t)sim->body_count, err) &&
            buffer_reserve(&sim->pressure, "pressure", padded * sizeof(float), err) &&
+           buffer_reserve(&sim->rows.density, "density", padded * sizeof(float), err) &&
            buffer_reserve(&sim->object_forces, "object forces",
                           (1 + (size_t)sim->body_count) * 6 * sizeof(double), err) &&
            buffer_reserve(&sim->sums, "statistics", (padded / BLOCK + 1) * 128, err);

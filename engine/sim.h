@@ -93,6 +93,9 @@ void drives_apply(SkiffSim *sim);
 bool probes_make(SkiffSim *sim, const SkiffDef *def, Err *err);
 void probes_free(SkiffSim *sim);
 
+/* sim->pressure from the pressures of both solves. */
+void sim_add_pressures(SkiffSim *sim);
+
 /* Room for `capacity` particles in everything a step uses; what is there stays. */
 bool sim_reserve(SkiffSim *sim, uint32_t capacity, Err *err);
 

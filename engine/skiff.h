@@ -227,6 +227,11 @@ void skiff_destroy(SkiffSim *sim);
  * which the fault was found. */
 bool skiff_step(SkiffSim *sim, Err *err);
 
+/* Fills a block with water at rest now, whatever its `fill`, `time` and `repeat` say. What is there already
+ * does not move. False, and the simulation is as it was: ERR_INPUT, there is no room in the block, or no
+ * memory, or params.volume_factor is not the rest tile's; ERR_DIVERGED, what exists is not fit to be filled
+ * beside. */
+bool skiff_fill_block(SkiffSim *sim, const SkiffBlockDef *block, Err *err);
 /* Takes away the fluid particles inside [min, max) (m, world); the others stay as they are. ERR_INPUT: no
  * memory, and nothing is removed. */
 bool skiff_remove_box(SkiffSim *sim, const double min[3], const double max[3], uint32_t *removed, Err *err);
@@ -247,8 +252,8 @@ typedef struct SkiffParticles {
     double origin[3];
     const float (*position)[4]; /* m; [3] is unused */
     const float (*velocity)[4]; /* m/s */
-    const float *density;       /* rho / rho0, at the start of the last step */
-    const float *pressure;      /* Pa, mean over the last step */
+    const float *density;       /* rho / rho0, at the start of the last step; 0 before a particle's first */
+    const float *pressure;      /* Pa, mean over the last step; before it, of water at rest */
     const uint64_t *id;         /* never reused */
     const double *birth;        /* s */
 } SkiffParticles;

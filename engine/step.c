@@ -86,14 +86,20 @@ static void solve_density(SkiffSim *sim) {
     sim->stats.residual_percent = 100.0 * result.residual;
 }
 
-/* Pressure of this step, of both solves together, and the forces of the fluid on tank and bodies. */
-static void measure_forces(SkiffSim *sim) {
+void sim_add_pressures(SkiffSim *sim) {
     float *total = sim->pressure.data;
     const Particles *particles = &sim->particles;
     const float unit = sim->params.rest_density / (sim->params.time_step * sim->params.time_step);
 #pragma omp parallel for schedule(static) num_threads(sim->threads)
     for (uint32_t i = 0; i < particles->count; i++)
         total[i] = unit * (particles->pressure[i] + particles->pressure_divergence[i]);
+}
+
+/* Pressure of this step and the forces of the fluid on tank and bodies. */
+static void measure_forces(SkiffSim *sim) {
+    sim_add_pressures(sim);
+    const float *total = sim->pressure.data;
+    const Particles *particles = &sim->particles;
     double(*forces)[6] = sim->object_forces.data;
     boundary_impulse(&sim->boundary, total, particles_blocks(particles), forces, sim->threads);
     for (uint32_t o = 0; o < sim->boundary.object_count; o++)

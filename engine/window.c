@@ -9,11 +9,12 @@
 #include <math.h>
 
 typedef struct WindowPlace {
+    const SkiffSim *sim;
     const Shape *walls;
     float shift[3]; /* m */
     float overlap;  /* m: new water may come in this deep, where the cut through the old has left gaps */
-    float old_margin, new_margin,
-        deep; /* m; deep: what lies this much deeper in the kept water is not needed */
+    float support;  /* m */
+    float old_margin, new_margin; /* m */
 } WindowPlace;
 
 /* How far p, in the window after the move, lies inside the water that stayed, m. */
@@ -24,12 +25,30 @@ static float depth_in_kept(const WindowPlace *place, const float p[3]) {
     return fminf(in_old, in_new);
 }
 
+/* Bodies touch water too: is p within their bounds and a support? */
+static bool near_body(const WindowPlace *place, const float p[3]) {
+    const SkiffSim *sim = place->sim;
+    for (int b = 0; b < sim->body_count; b++) {
+        double distance_sq = 0.0;
+        for (int k = 0; k < 3; k++) {
+            const double arm = (double)p[k] + sim->origin[k] - sim->bodies[b].position[k];
+            distance_sq += arm * arm;
+        }
+        const double reach = sim->bodies[b].reach + (double)place->support;
+        if (distance_sq < reach * reach)
+            return true;
+    }
+    return false;
+}
+
 /* Points inside the water that stayed can never be added, whatever holes a wave has left there, but they lend
  * their density: the new water's neighbourhoods are full. */
 static RestPlace ring_place(const void *user, const float p[3]) {
     const WindowPlace *place = user;
     const float depth = depth_in_kept(place, p);
-    return depth < place->overlap ? REST_IN_WATER : depth < place->deep ? REST_IN_AIR : REST_OUTSIDE;
+    if (depth < place->overlap)
+        return depth < -place->support && !near_body(place, p) ? REST_STILL : REST_IN_WATER;
+    return depth < place->overlap + place->support ? REST_IN_AIR : REST_OUTSIDE;
 }
 
 /* Where the middle of the window should be, world, m. */
@@ -132,14 +151,14 @@ static bool fill_ring(SkiffSim *sim, const WindowPlace *place, Err *err) {
 }
 
 bool window_follow(SkiffSim *sim, Err *err) {
-    WindowPlace place = {.walls = &sim->tank};
+    WindowPlace place = {.sim = sim, .walls = &sim->tank};
     if (!next_shift(sim, place.shift))
         return true;
     const float support = sim->kernel.support;
     place.old_margin = sim->params.window_old * sim->params.particle_radius;
     place.new_margin = sim->params.window_new * support;
     place.overlap = sim->params.window_overlap * sim->params.particle_radius;
-    place.deep = 2.0f * support;
+    place.support = support;
     if (!move_water(sim, &place, err))
         return false;
     if (sim->particles.count == 0)

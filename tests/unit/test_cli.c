@@ -164,6 +164,10 @@ static void usage_mistakes_exit_with_2(void **state) {
         {"rest", "skiff rest: a command is missing\nTry 'skiff rest --help'.\n"},
         {"rest mkae", "skiff rest: unknown command mkae, did you mean make?\nTry 'skiff rest --help'.\n"},
         {"help rest mkae", "skiff rest: unknown command mkae, did you mean make?\n"},
+        {"reproduce carensac2023 tabel1",
+         "skiff reproduce carensac2023: expected table1, fig2, fig4c or all, found \"tabel1\"\n"},
+        {"reproduce carensac2023 --runs 0",
+         "skiff reproduce carensac2023: --runs: expected an integer from 1 to 10000, found \"0\"\n"},
         {"rest make tile", "skiff rest make: takes options only, \"tile\" is given\n"},
         {"rest make --edge 5", "skiff rest make: --edge: expected a number from 6 to 64, found \"5\"\n"},
         {"rest cut -o block.skiff", "skiff rest cut: the folder is missing\n"},
@@ -189,6 +193,8 @@ static void help_explains_every_command(void **state) {
     expect("rest --help", 0, "skiff rest cut DIR -o FILE", NULL);
     expect("help rest", 0, "skiff rest show [FILE]", NULL);
     expect("help rest make", 0, "Usage: skiff rest make [-o FILE] [OPTION]...", NULL);
+    expect("help rest fill", 0, "Usage: skiff rest fill SCENE [OPTION]...", NULL);
+    expect("help reproduce carensac2023", 0, "[EXPERIMENT] [OPTION]...", NULL);
     for (int i = 0; i < COUNT(commands); i++) {
         char arguments[64], usage[64];
         snprintf(usage, sizeof usage, "Usage: skiff %s SCENE", commands[i]);

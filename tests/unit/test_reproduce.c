@@ -169,16 +169,20 @@ static void table1_is_the_paper_s(void **state) {
     (void)state;
     Sheet sheet;
     assert_true(carensac_sheet(CARENSAC_TABLE1, &sheet, NULL));
-    assert_int_equal(sheet.row_count, 4);
-    double sums[4];
-    for (int r = 0; r < 4; r++) {
+    assert_int_equal(sheet.row_count, CARENSAC_METHOD_COUNT * CARENSAC_FILL_COUNT);
+    double sums[CARENSAC_FILL_COUNT];
+    for (int r = 0; r < CARENSAC_FILL_COUNT; r++) {
         const double *paper = sheet.rows[r].paper;
         sums[r] = paper[CARENSAC_LOADING] + paper[CARENSAC_SELECTION] + paper[CARENSAC_STABILIZATION];
         /* its totals are the sums of the rounded medians, or a digit beside them */
         assert_float_equal(paper[CARENSAC_TOTAL], sums[r], 1.65);
         assert_true(paper[CARENSAC_NEAR] < paper[CARENSAC_NEAR_BEFORE]);
     }
+    for (int r = CARENSAC_FILL_COUNT; r < sheet.row_count; r++)
+        for (int c = 0; c < sheet.column_count; c++)
+            assert_true(isnan(sheet.rows[r].paper[c]));
     assert_string_equal(sheet.rows[CARENSAC_PYRAMID].name, "pyramid");
+    assert_string_equal(sheet.rows[CARENSAC_FILL_COUNT + CARENSAC_PYRAMID].name, "pyramid, defaults");
     assert_float_equal(sheet.rows[CARENSAC_FLUID_FLUID].paper[CARENSAC_SPREAD], 3.4, 0);
     sheet_free(&sheet);
 }

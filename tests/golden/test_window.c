@@ -1,0 +1,147 @@
+/* A window that moves gives the same state whatever computes it, also after a save and resume, and keeps its
+ * water.
+ *
+ * Scene: a small star-shaped window over 0.4 m of still water follows a floating crate that is pulled, 120
+ * steps with several moves, absorption on. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+#include "skiff.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { STEPS = 120 };
+
+static SkiffSim *make(int threads, SkiffSimd simd, double start) {
+    static const double pull = 2.6; /* m/s */
+    SkiffDef def = skiff_def_default();
+    Err err = {0};
+    def.threads = threads;
+    def.simd = simd;
+    def.params.particle_radius = 0.04f;
+    def.params.time_step = 0.005f;
+    def.params.sea_steps = 10;
+    def.params.rest_steps = 4;
+    def.params.escape = 1;
+    def.tank.geometry.kind = SKIFF_GEOMETRY_STAR;
+    def.tank.geometry.branches = 5;
+    def.tank.geometry.radius = 1.1f;
+    def.tank.geometry.inner_radius = 0.8f;
+    def.tank.geometry.height = 1.0f;
+    def.tank.geometry.translation[0] = (float)start;
+    def.tank.geometry.translation[1] = 0.5f;
+    def.tank.wet_height = 0.8f;
+    def.sea = (SkiffSeaDef){.on = true, .level = 0.4f, .follow = "crate", .absorb = true};
+    SkiffBodyDef crate = skiff_body_default();
+    crate.name = "crate";
+    crate.geometry.kind = SKIFF_GEOMETRY_BOX;
+    const float size[3] = {0.4f, 0.3f, 0.3f};
+    memcpy(crate.geometry.size, size, sizeof size);
+    crate.geometry.translation[0] = (float)start;
+    crate.geometry.translation[1] = 0.4f;
+    crate.density = 500.0f;
+    crate.free_axes = SKIFF_FREE_ALL & ~SKIFF_FREE_X;
+    crate.velocity[0] = (float)pull;
+    def.bodies = &crate;
+    def.body_count = 1;
+    SkiffSim *sim = skiff_create(&def, &err);
+    if (sim == NULL)
+        fail_msg("%s", err.message);
+    return sim;
+}
+
+static void run(SkiffSim *sim, int steps) {
+    Err err = {0};
+    for (int k = 0; k < steps; k++)
+        if (!skiff_step(sim, &err))
+            fail_msg("%s", err.message);
+}
+
+static uint64_t hash_of(int threads, SkiffSimd simd) {
+    SkiffSim *sim = make(threads, simd, 0.0);
+    run(sim, STEPS);
+    SkiffWindow window;
+    assert_true(skiff_window(sim, &window));
+    assert_true(window.moves >= 3);
+    const uint64_t hash = skiff_hash(sim);
+    skiff_destroy(sim);
+    return hash;
+}
+
+static void test_threads_and_instruction_sets(void **state) {
+    (void)state;
+    const uint64_t expected = hash_of(1, SKIFF_SIMD_PLAIN);
+    for (int threads = 2; threads <= 3; threads++)
+        assert_int_equal(hash_of(threads, SKIFF_SIMD_AUTO), expected);
+}
+
+static void test_save_and_resume(void **state) {
+    (void)state;
+    Err err = {0};
+    char path[64];
+    snprintf(path, sizeof path, "window_resume_%d.skiff", (int)getpid());
+    SkiffSim *whole = make(2, SKIFF_SIMD_AUTO, 0.0);
+    run(whole, 70);
+    assert_true(skiff_save(whole, path, &err));
+    run(whole, 50);
+    SkiffSim *resumed = make(1, SKIFF_SIMD_AUTO, 0.0);
+    if (!skiff_load(resumed, path, &err))
+        fail_msg("%s", err.message);
+    run(resumed, 50);
+    assert_int_equal(skiff_hash(resumed), skiff_hash(whole));
+    skiff_destroy(whole);
+    skiff_destroy(resumed);
+    unlink(path);
+}
+
+/* What the moves take away and bring in balances, and everything is accounted for. */
+static void test_ledger(void **state) {
+    (void)state;
+    SkiffSim *sim = make(2, SKIFF_SIMD_AUTO, 0.0);
+    const uint32_t first = skiff_particles(sim).count;
+    int64_t balance = first;
+    for (int k = 0; k < STEPS; k++) {
+        run(sim, 1);
+        const SkiffStats *stats = skiff_stats(sim);
+        for (int c = 0; c < SKIFF_IN_COUNT; c++)
+            balance += stats->particles_in[c];
+        for (int c = 0; c < SKIFF_OUT_COUNT; c++)
+            balance -= stats->particles_out[c];
+        assert_int_equal(balance, skiff_particles(sim).count);
+    }
+    assert_true(fabs((double)balance / first - 1.0) < 0.03);
+    skiff_destroy(sim);
+}
+
+/* Positions are relative to the window: 100 km from the origin nothing is coarser. */
+static void test_far_away(void **state) {
+    (void)state;
+    SkiffSim *near = make(2, SKIFF_SIMD_AUTO, 0.0), *far = make(2, SKIFF_SIMD_AUTO, 1e5);
+    run(near, STEPS);
+    run(far, STEPS);
+    const SkiffStats *a = skiff_stats(near), *b = skiff_stats(far);
+    assert_true(fabs(a->mean_height / b->mean_height - 1.0) < 0.02);
+    assert_true(fabs((double)a->particles / b->particles - 1.0) < 0.01);
+    assert_true(fabs(a->mean_speed - b->mean_speed) < 0.3 * a->mean_speed);
+    SkiffWindow window;
+    assert_true(skiff_window(far, &window));
+    assert_true(window.moves >= 3);
+    skiff_destroy(near);
+    skiff_destroy(far);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_threads_and_instruction_sets),
+        cmocka_unit_test(test_save_and_resume),
+        cmocka_unit_test(test_ledger),
+        cmocka_unit_test(test_far_away),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
