@@ -49,12 +49,12 @@ static const struct {
     {"{\"version\": \"1\"}", "s.json: version: expected 1, found \"1\""},
     {"{\"version\": 1, \"title\": 3}", "s.json: title: expected text, found 3"},
     {"{\"version\": 1, \"Tnak\": {}}", "s.json: Tnak: unknown key, did you mean Tank?"},
-    {"{\"version\": 1, \"Boats\": {}}",
-     "s.json: Boats: unknown key, expected one of $schema, version, title, description, Configuration, Tank, "
-     "FluidBlocks, RigidBodies, Probes, input, Keys, Render"},
-    {"{\"version\": 1, \"\\u001b[31m\": 1}",
-     "s.json: ?[31m: unknown key, expected one of $schema, version, title, description, Configuration, Tank, "
-     "FluidBlocks, RigidBodies, Probes, input, Keys, Render"},
+    {"{\"version\": 1, \"Boats\": {}}", "s.json: Boats: unknown key, expected one of $schema, version, "
+                                        "title, description, Configuration, Tank, Sea, "
+                                        "FluidBlocks, RigidBodies, Probes, input, Keys, Render"},
+    {"{\"version\": 1, \"\\u001b[31m\": 1}", "s.json: ?[31m: unknown key, expected one of $schema, version, "
+                                             "title, description, Configuration, Tank, Sea, "
+                                             "FluidBlocks, RigidBodies, Probes, input, Keys, Render"},
 };
 
 /* Bodies of a scene: `"version": 1` stands before them. */
