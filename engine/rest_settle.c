@@ -10,7 +10,9 @@
  *
  * restSettle all: in the simulation itself, all new water. A thin layer between walls and water that cannot
  * yield ends crowded or starved wherever the selection took one point too few or too many, and so the first
- * free steps move everything; and a cut through water at rest is no free surface at rest. */
+ * free steps move everything; and a cut through water at rest is no free surface at rest. Existing water
+ * stands still here too. Beside the new it begins with the pressure of still water and then, where the new
+ * water crowds it, presses harder until it is not. */
 #include "sim.h"
 
 #include <math.h>
@@ -20,8 +22,10 @@ static const double FIRST_ALPHA = 0.8, LAST_ALPHA = 0.1;
 /* Calming without limit: nothing that settles moves as it should. m/s^2 */
 static const float NO_LIMIT = 1e3f;
 
-/* r / sqrt(p / rho0): steps of 1.5 are unstable, whatever depth and radius */
+/* Longest step, r / sqrt(p / rho0): 1.5 is unstable, whatever depth and radius. */
 static const float LONGEST = 1.1f;
+/* Of a density error of held water, the share that a step turns into pressure: with 1 its pressures swing. */
+static const float HELD_SHARE = 0.15f;
 
 /* What settles, and with what. */
 typedef struct Settle {
@@ -176,6 +180,31 @@ static bool search_all(Settle *settle, uint64_t first_id, Err *err) {
     return settle_rows(settle, err);
 }
 
+static bool beside_moving(const Settle *settle, uint32_t i) {
+    RestNeighbour row[MAX_NEIGHBOURS];
+    const int length = rest_row(&settle->rows->pairs, i, row);
+    for (int k = 0; k < length; k++)
+        if (!settle->held[row[k].index])
+            return true;
+    return false;
+}
+
+/* What is held beside the new water: where it is too dense it presses more, and less where it is too thin, so
+ * that the new water comes to rest where both are at rest. */
+static void correct_held(Settle *settle) {
+    Particles *particles = settle->particles;
+    const PairData *pairs = &settle->rows->pairs;
+#pragma omp parallel for schedule(static, BLOCK) num_threads(settle->sim->threads)
+    for (uint32_t i = 0; i < particles->count; i++) {
+        const bool has_row = settle->frozen == NULL || !settle->frozen[i];
+        if (!settle->held[i] || !has_row || !beside_moving(settle, i))
+            continue;
+        const float diagonal = fmaxf(pairs->gradient_sum[i][3], 1.0f);
+        const float next = particles->pressure[i] + HELD_SHARE * (pairs->density[i] - 1.0f) / diagonal;
+        particles->pressure[i] = fmaxf(next, 0.0f);
+    }
+}
+
 static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, SkiffFill *fill, Err *err) {
     SkiffParams *params = &settle->params;
     const double unit = (double)(params->particle_radius / params->time_step);
@@ -202,6 +231,8 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
         if (params->rest_divergence)
             dfsph_solve(settle->dfsph, &problem, SOLVE_DIVERGENCE);
         forces_apply_fluid(&problem, settle->dfsph);
+        if (settle->held != NULL)
+            correct_held(settle);
         dfsph_solve(settle->dfsph, &problem, SOLVE_DENSITY);
         const SpeedSums speeds = measure_speeds(settle);
         fill->mean_speed = speeds.mean;
@@ -215,13 +246,20 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
     return true;
 }
 
-/* The cloud's new water joins the simulation's. */
-static void take_over(SkiffSim *sim, double birth, SkiffFill *fill) {
+/* The cloud's new water joins the simulation's. What exists beside it takes the pressure of still water, if
+ * that is what the new water is to settle against there. */
+static void take_over(SkiffSim *sim, bool all, double birth, SkiffFill *fill) {
     const Particles *points = &sim->rest.points;
     for (uint32_t i = 0; i < points->count; i++) {
         const RestKind kind = rest_kind(points->id[i]);
-        if (kind == REST_EXISTING || kind == REST_EXISTING_RIM)
+        if (kind == REST_EXISTING || kind == REST_EXISTING_RIM) {
+            const uint32_t at = (uint32_t)points->id[i];
+            if (all) {
+                sim->particles.pressure[at] = points->pressure[i];
+                sim->particles.pressure_divergence[at] = 0.0f;
+            }
             continue;
+        }
         const uint32_t to =
             particles_append(&sim->particles, points->position[i], (const float[3]){0}, birth);
         sim->particles.pressure[to] = points->pressure[i];
@@ -332,7 +370,7 @@ bool rest_fill(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *
     const double selected = timer_ms();
     good = good && (all || rest_settle(sim, request->surface, fill, err));
     if (good)
-        take_over(sim, request->birth, fill);
+        take_over(sim, all, request->birth, fill);
     const bool fits = request->fitted != NULL && fill->candidates == 0; /* as it is */
     good = good && (!all || fits || rest_settle_all(sim, request->surface, first_id, fill, err));
     if (good)
