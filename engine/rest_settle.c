@@ -26,6 +26,8 @@ static const float NO_LIMIT = 1e3f;
 static const float LONGEST = 1.1f;
 /* Of a density error of held water, the share that a step turns into pressure: with 1 its pressures swing. */
 static const float HELD_SHARE = 0.15f;
+/* Of what two particles lack to the distance of a radius, the share that each moves a step. */
+static const float PART_SHARE = 0.1f;
 
 /* What settles, and with what. */
 typedef struct Settle {
@@ -205,6 +207,35 @@ static void correct_held(Settle *settle) {
     }
 }
 
+/* Moves who is closer than a radius to another a little apart: so close the kernel's gradient vanishes, and
+ * pressure itself pushes pairs together. */
+static void part_pairs(const Settle *settle) {
+    Particles *particles = settle->particles;
+    const float r = settle->params.particle_radius;
+    const int32_t close = (int32_t)(32767.0f * (1.0f - 6.0f / 16.0f * (1.0f - 1.0f / 4.0f))); /* q = 1/4 */
+#pragma omp parallel for schedule(static, BLOCK) num_threads(settle->sim->threads)
+    for (uint32_t i = 0; i < particles->count; i++) {
+        RestNeighbour row[MAX_NEIGHBOURS];
+        const bool moves = settle->held == NULL || !settle->held[i];
+        const int length = moves ? rest_row(&settle->rows->pairs, i, row) : 0;
+        for (int n = 0; n < length; n++) {
+            if (row[n].weight <= close)
+                continue;
+            float apart[3], distance_sq = 0.0f;
+            for (int k = 0; k < 3; k++) {
+                apart[k] = particles->position[i][k] - particles->position[row[n].index][k];
+                distance_sq += apart[k] * apart[k];
+            }
+            const float distance = sqrtf(distance_sq);
+            if (!(distance > 0.0f && distance < r))
+                continue;
+            const float speed = PART_SHARE * (r - distance) / settle->params.time_step;
+            for (int k = 0; k < 3; k++)
+                particles->velocity[i][k] += speed * apart[k] / distance;
+        }
+    }
+}
+
 static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, SkiffFill *fill, Err *err) {
     SkiffParams *params = &settle->params;
     const double unit = (double)(params->particle_radius / params->time_step);
@@ -231,6 +262,8 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
         if (params->rest_divergence)
             dfsph_solve(settle->dfsph, &problem, SOLVE_DIVERGENCE);
         forces_apply_fluid(&problem, settle->dfsph);
+        if (params->rest_settle == REST_SETTLE_ALL)
+            part_pairs(settle);
         if (settle->held != NULL)
             correct_held(settle);
         dfsph_solve(settle->dfsph, &problem, SOLVE_DENSITY);
@@ -246,25 +279,31 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
     return true;
 }
 
-/* The cloud's new water joins the simulation's. What exists beside it takes the pressure of still water, if
- * that is what the new water is to settle against there. */
-static void take_over(SkiffSim *sim, bool all, double birth, SkiffFill *fill) {
+/* The cloud's new water joins the simulation's. */
+static void take_over(SkiffSim *sim, double birth, SkiffFill *fill) {
     const Particles *points = &sim->rest.points;
     for (uint32_t i = 0; i < points->count; i++) {
         const RestKind kind = rest_kind(points->id[i]);
-        if (kind == REST_EXISTING || kind == REST_EXISTING_RIM) {
-            const uint32_t at = (uint32_t)points->id[i];
-            if (all) {
-                sim->particles.pressure[at] = points->pressure[i];
-                sim->particles.pressure_divergence[at] = 0.0f;
-            }
+        if (kind == REST_EXISTING || kind == REST_EXISTING_RIM)
             continue;
-        }
         const uint32_t to =
             particles_append(&sim->particles, points->position[i], (const float[3]){0}, birth);
         sim->particles.pressure[to] = points->pressure[i];
         sim->particles.pressure_divergence[to] = points->pressure_divergence[i];
         fill->particles++;
+    }
+}
+
+/* What exists beside new water takes the pressure of still water, which that is to settle against. */
+static void still_existing(SkiffSim *sim) {
+    const Particles *points = &sim->rest.points;
+    for (uint32_t i = 0; i < points->count; i++) {
+        const RestKind kind = rest_kind(points->id[i]);
+        if (kind != REST_EXISTING && kind != REST_EXISTING_RIM)
+            continue;
+        const uint32_t at = (uint32_t)points->id[i];
+        sim->particles.pressure[at] = points->pressure[i];
+        sim->particles.pressure_divergence[at] = 0.0f;
     }
 }
 
@@ -282,6 +321,7 @@ bool rest_settle_all(SkiffSim *sim, float surface, uint64_t first_id, SkiffFill 
     fill->active = fill->particles;
     if (fill->active == 0)
         return true;
+    still_existing(sim);
     if (!buffer_reserve(&sim->rest.held, "held particles", sim->particles.capacity + SLICE, err))
         return false;
     const bool nothing_else = fill->active == sim->particles.count;
@@ -370,7 +410,7 @@ bool rest_fill(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *
     const double selected = timer_ms();
     good = good && (all || rest_settle(sim, request->surface, fill, err));
     if (good)
-        take_over(sim, all, request->birth, fill);
+        take_over(sim, request->birth, fill);
     const bool fits = request->fitted != NULL && fill->candidates == 0; /* as it is */
     good = good && (!all || fits || rest_settle_all(sim, request->surface, first_id, fill, err));
     if (good)
