@@ -84,6 +84,13 @@ bool rest_settle_all(struct SkiffSim *sim, float surface, uint64_t first_id, Ski
 /* Sorts the cloud, freezes what is of no kind in `evaluated` (bits 1 << RestKind), and makes rows and
  * boundary terms of the rest. */
 bool rest_search(struct SkiffSim *sim, uint32_t evaluated, Err *err);
+typedef struct RestNeighbour {
+    uint32_t index;
+    int32_t weight; /* in units of W(0) / 32767 */
+} RestNeighbour;
+/* Neighbours of particle i from its row, at most MAX_NEIGHBOURS; unused places have no weight and are left
+ * out. Their number. */
+int rest_row(const PairData *pairs, uint32_t i, RestNeighbour *row);
 /* Distance from bodies and, if asked, walls, m: positive where water may be. An open tank goes on above its
  * rim. */
 float rest_clearance(const struct SkiffSim *sim, const float p[3], bool walls);

@@ -197,12 +197,18 @@ static bool lay_points(Gather *gather, uint32_t *count, Err *err) {
     return true;
 }
 
-/* P of still water at p: with a tile in the proportions that balance its points. */
+/* P of still water at p. */
+static float still_pressure(const Gather *gather, const float p[3]) {
+    const SkiffParams *params = &gather->sim->params;
+    const float depth = gather->request->surface - p[1];
+    return fmaxf(-params->gravity[1] * depth * params->time_step * params->time_step, 0.0f);
+}
+
+/* With a tile in the proportions that balance its points. */
 static void first_pressure(const Gather *gather, const float p[3], uint32_t source, float pressure[2]) {
     const SkiffSim *sim = gather->sim;
     const RestFitted *fitted = gather->request->fitted;
-    const float depth = gather->request->surface - p[1], dt = sim->params.time_step;
-    pressure[0] = depth > 0.0f ? -sim->params.gravity[1] * depth * dt * dt : 0.0f;
+    pressure[0] = still_pressure(gather, p);
     pressure[1] = 0.0f;
     if (fitted != NULL) {
         pressure[0] = fitted->pressure[source][0];
@@ -210,7 +216,6 @@ static void first_pressure(const Gather *gather, const float p[3], uint32_t sour
     } else {
         pressure[0] *= sim->tile.share[source];
     }
-    pressure[0] = pressure[0] > 0.0f ? pressure[0] : 0.0f;
 }
 
 static void append(const Gather *gather, Particles *points, uint32_t i, uint64_t id, double birth) {
@@ -223,7 +228,8 @@ static void append(const Gather *gather, Particles *points, uint32_t i, uint64_t
     points->id[to] = id;
 }
 
-/* Existing water that the cloud's points can feel. */
+/* Existing water that the cloud's points can feel. It presses as still water does: its own pressures are
+ * those of one step, and swing by their own size from step to step. */
 static void add_existing(Gather *gather) {
     SkiffSim *sim = gather->sim;
     Particles *points = &sim->rest.points;
@@ -237,7 +243,7 @@ static void add_existing(Gather *gather) {
             continue;
         const uint32_t to = particles_append(points, p, sim->particles.velocity[i], 0.0);
         points->id[to] = rest_id(REST_EXISTING, i);
-        points->pressure[to] = sim->particles.pressure[i];
+        points->pressure[to] = still_pressure(gather, p);
     }
 }
 

@@ -33,14 +33,7 @@ typedef struct Select {
                                                                                           i < select->count; \
                                                                                           i++)
 
-typedef struct Neighbour {
-    uint32_t index;
-    int32_t weight; /* in units of W(0) / 32767 */
-} Neighbour;
-
-/* Neighbours of point i from its row; unused places have no weight and are left out. */
-static int row_of(const Select *select, uint32_t i, Neighbour *row) {
-    const PairData *pairs = select->pairs;
+int rest_row(const PairData *pairs, uint32_t i, RestNeighbour *row) {
     const uint32_t slice = i / SLICE, lane = i % SLICE, first = slice * SLICE;
     const uint32_t begin = pairs->slice_start[slice];
     int count = 0;
@@ -50,7 +43,7 @@ static int row_of(const Select *select, uint32_t i, Neighbour *row) {
             continue;
         const int32_t offset = pairs->wide ? ((const RowEntryWide *)pairs->entries)[entry].index[lane]
                                            : ((const RowEntry *)pairs->entries)[entry].index[lane];
-        row[count++] = (Neighbour){(uint32_t)((int32_t)first + offset), weight};
+        row[count++] = (RestNeighbour){(uint32_t)((int32_t)first + offset), weight};
     }
     return count;
 }
@@ -87,9 +80,9 @@ static void find_candidates(Select *select) {
         select->state[i] = PASSIVE;
         if (kind != REST_FLUID && kind != REST_AIR)
             continue;
-        Neighbour row[MAX_NEIGHBOURS];
+        RestNeighbour row[MAX_NEIGHBOURS];
         int32_t existing = 0, closest = 0;
-        const int length = row_of(select, i, row);
+        const int length = rest_row(select->pairs, i, row);
         for (int k = 0; k < length; k++) {
             if (kind_of(select, row[k].index) != REST_EXISTING)
                 continue;
@@ -109,9 +102,9 @@ static void sum_weights(Select *select) {
     EACH_POINT {
         if (select->state[i] != CANDIDATE)
             continue;
-        Neighbour row[MAX_NEIGHBOURS];
+        RestNeighbour row[MAX_NEIGHBOURS];
         int32_t sum = 0;
-        const int length = row_of(select, i, row);
+        const int length = rest_row(select->pairs, i, row);
         for (int k = 0; k < length; k++) {
             const uint32_t j = row[k].index;
             if (select->state[j] != GONE && kind_of(select, j) != REST_EXISTING)
@@ -170,8 +163,8 @@ static bool shields(const Select *select, uint32_t j, uint32_t i) {
 }
 
 static bool is_protected(const Select *select, uint32_t i, float limit) {
-    Neighbour row[MAX_NEIGHBOURS];
-    const int length = row_of(select, i, row);
+    RestNeighbour row[MAX_NEIGHBOURS];
+    const int length = rest_row(select->pairs, i, row);
     for (int k = 0; k < length; k++) {
         const float share = select->unit * (float)row[k].weight;
         if (share > select->params->rest_min_share && select->density[i] - share < limit &&
@@ -212,8 +205,8 @@ static void remove_above(Select *select, float limit) {
         if (select->state[i] != MARKED)
             continue;
         select->state[i] = GONE;
-        Neighbour row[MAX_NEIGHBOURS];
-        const int length = row_of(select, i, row);
+        RestNeighbour row[MAX_NEIGHBOURS];
+        const int length = rest_row(select->pairs, i, row);
         for (int n = 0; n < length; n++)
             select->sum[row[n].index] -= row[n].weight;
     }
@@ -276,8 +269,8 @@ static void mark_rim(Select *select) {
     for (uint32_t i = 0; i < select->count; i++) {
         if (select->state[i] != CANDIDATE)
             continue;
-        Neighbour row[MAX_NEIGHBOURS];
-        const int length = row_of(select, i, row);
+        RestNeighbour row[MAX_NEIGHBOURS];
+        const int length = rest_row(select->pairs, i, row);
         for (int k = 0; k < length; k++) {
             const uint32_t j = row[k].index;
             const RestKind kind = rest_kind(id[j]);

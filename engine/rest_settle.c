@@ -10,7 +10,9 @@
  *
  * restSettle all: in the simulation itself, all new water. A thin layer between walls and water that cannot
  * yield ends crowded or starved wherever the selection took one point too few or too many, and so the first
- * free steps move everything; and a cut through water at rest is no free surface at rest. */
+ * free steps move everything; and a cut through water at rest is no free surface at rest. Existing water
+ * stands still here too. Beside the new it begins with the pressure of still water and then, where the new
+ * water crowds it, presses harder until it is not. */
 #include "sim.h"
 
 #include <math.h>
@@ -20,8 +22,12 @@ static const double FIRST_ALPHA = 0.8, LAST_ALPHA = 0.1;
 /* Calming without limit: nothing that settles moves as it should. m/s^2 */
 static const float NO_LIMIT = 1e3f;
 
-/* r / sqrt(p / rho0): steps of 1.5 are unstable, whatever depth and radius */
+/* Longest step, r / sqrt(p / rho0): 1.5 is unstable, whatever depth and radius. */
 static const float LONGEST = 1.1f;
+/* Of a density error of held water, the share that a step turns into pressure: with 1 its pressures swing. */
+static const float HELD_SHARE = 0.15f;
+/* Of what two particles lack to the distance of a radius, the share that each moves a step. */
+static const float PART_SHARE = 0.1f;
 
 /* What settles, and with what. */
 typedef struct Settle {
@@ -176,6 +182,60 @@ static bool search_all(Settle *settle, uint64_t first_id, Err *err) {
     return settle_rows(settle, err);
 }
 
+static bool beside_moving(const Settle *settle, uint32_t i) {
+    RestNeighbour row[MAX_NEIGHBOURS];
+    const int length = rest_row(&settle->rows->pairs, i, row);
+    for (int k = 0; k < length; k++)
+        if (!settle->held[row[k].index])
+            return true;
+    return false;
+}
+
+/* What is held beside the new water: where it is too dense it presses more, and less where it is too thin, so
+ * that the new water comes to rest where both are at rest. */
+static void correct_held(Settle *settle) {
+    Particles *particles = settle->particles;
+    const PairData *pairs = &settle->rows->pairs;
+#pragma omp parallel for schedule(static, BLOCK) num_threads(settle->sim->threads)
+    for (uint32_t i = 0; i < particles->count; i++) {
+        const bool has_row = settle->frozen == NULL || !settle->frozen[i];
+        if (!settle->held[i] || !has_row || !beside_moving(settle, i))
+            continue;
+        const float diagonal = fmaxf(pairs->gradient_sum[i][3], 1.0f);
+        const float next = particles->pressure[i] + HELD_SHARE * (pairs->density[i] - 1.0f) / diagonal;
+        particles->pressure[i] = fmaxf(next, 0.0f);
+    }
+}
+
+/* Moves who is closer than a radius to another a little apart: so close the kernel's gradient vanishes, and
+ * pressure itself pushes pairs together. */
+static void part_pairs(const Settle *settle) {
+    Particles *particles = settle->particles;
+    const float r = settle->params.particle_radius;
+    const int32_t close = (int32_t)(32767.0f * (1.0f - 6.0f / 16.0f * (1.0f - 1.0f / 4.0f))); /* q = 1/4 */
+#pragma omp parallel for schedule(static, BLOCK) num_threads(settle->sim->threads)
+    for (uint32_t i = 0; i < particles->count; i++) {
+        RestNeighbour row[MAX_NEIGHBOURS];
+        const bool moves = settle->held == NULL || !settle->held[i];
+        const int length = moves ? rest_row(&settle->rows->pairs, i, row) : 0;
+        for (int n = 0; n < length; n++) {
+            if (row[n].weight <= close)
+                continue;
+            float apart[3], distance_sq = 0.0f;
+            for (int k = 0; k < 3; k++) {
+                apart[k] = particles->position[i][k] - particles->position[row[n].index][k];
+                distance_sq += apart[k] * apart[k];
+            }
+            const float distance = sqrtf(distance_sq);
+            if (!(distance > 0.0f && distance < r))
+                continue;
+            const float speed = PART_SHARE * (r - distance) / settle->params.time_step;
+            for (int k = 0; k < 3; k++)
+                particles->velocity[i][k] += speed * apart[k] / distance;
+        }
+    }
+}
+
 static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, SkiffFill *fill, Err *err) {
     SkiffParams *params = &settle->params;
     const double unit = (double)(params->particle_radius / params->time_step);
@@ -202,6 +262,10 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
         if (params->rest_divergence)
             dfsph_solve(settle->dfsph, &problem, SOLVE_DIVERGENCE);
         forces_apply_fluid(&problem, settle->dfsph);
+        if (params->rest_settle == REST_SETTLE_ALL)
+            part_pairs(settle);
+        if (settle->held != NULL)
+            correct_held(settle);
         dfsph_solve(settle->dfsph, &problem, SOLVE_DENSITY);
         const SpeedSums speeds = measure_speeds(settle);
         fill->mean_speed = speeds.mean;
@@ -239,6 +303,19 @@ static void take_over(SkiffSim *sim, uint32_t keep, double birth, SkiffFill *fil
     points->count = kept;
 }
 
+/* What exists beside new water takes the pressure of still water, which that is to settle against. */
+static void still_existing(SkiffSim *sim) {
+    const Particles *points = &sim->rest.points;
+    for (uint32_t i = 0; i < points->count; i++) {
+        const RestKind kind = rest_kind(points->id[i]);
+        if (kind != REST_EXISTING && kind != REST_EXISTING_RIM)
+            continue;
+        const uint32_t at = (uint32_t)points->id[i];
+        sim->particles.pressure[at] = points->pressure[i];
+        sim->particles.pressure_divergence[at] = 0.0f;
+    }
+}
+
 bool rest_settle(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err) {
     if (fill->active == 0 || sim->params.rest_steps == 0)
         return true;
@@ -255,6 +332,7 @@ bool rest_settle_all(SkiffSim *sim, float surface, uint64_t first_id, SkiffFill 
     fill->active = fill->particles;
     if (fill->active == 0)
         return true;
+    still_existing(sim);
     if (!buffer_reserve(&sim->rest.held, "held particles", sim->particles.capacity + SLICE, err))
         return false;
     const bool nothing_else = fill->active == sim->particles.count;
