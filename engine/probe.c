@@ -29,7 +29,8 @@ static bool probe_object(const SkiffSim *sim, const SkiffProbeDef *def, const ch
     }
     if (strcmp(def->object, "tank") == 0) {
         *object = 0;
-        return sim->tank.kind != SKIFF_GEOMETRY_NONE || err_add(err, ERR_INPUT, "%s.object: there is no tank", path);
+        return sim->tank.kind != SKIFF_GEOMETRY_NONE ||
+               err_add(err, ERR_INPUT, "%s.object: there is no tank", path);
     }
     for (int b = 0; b < sim->body_count; b++)
         if (strcmp(def->object, sim->bodies[b].name) == 0)
