@@ -23,18 +23,17 @@
 
 #include "passes.h"
 
-/* |V grad W| of a pair is at most one third of V l: see kernel.h. */
-static const float GRADIENT_STEPS = 3.0f * 32767.0f;
+/* -(dW/dr) / r is largest at r = 0, where it is 2 l / h: see kernel.h. */
+static const float FACTOR_STEPS = 65535.0f / 2.0f;
 
-/* V grad W in units of the fixed-point step, as a factor of x_i - x_j, and W. */
+/* -(dW/dr) / r in units of l / h, which grad W is minus x_i - x_j times, and W. */
 static inline void pair_kernel(const Kernel *kernel, Vf distance_sq, Vf *factor, Vf *weight) {
     const Vf inv_r = vf_rsqrt(distance_sq);
     const Vf q = vf_mul(vf_mul(distance_sq, inv_r), vf_set(kernel->inv_support));
     const Vf p = vf_sub(vf_set(1.0f), q);
     const Vm far = vf_less(vf_set(0.5f), q);
-    const Vf near_factor =
-        vf_mul(vf_set(GRADIENT_STEPS * kernel->inv_support), vf_fma(vf_set(3.0f), q, vf_set(-2.0f)));
-    const Vf far_factor = vf_mul(vf_mul(vf_set(-GRADIENT_STEPS), vf_mul(p, p)), inv_r);
+    const Vf near_factor = vf_fnma(vf_set(3.0f), q, vf_set(2.0f));
+    const Vf far_factor = vf_mul(vf_mul(vf_set(kernel->support), vf_mul(p, p)), inv_r);
     *factor = vf_select(far, far_factor, near_factor);
     const Vf near_weight = vf_fma(vf_mul(vf_set(-6.0f), vf_mul(q, q)), p, vf_set(1.0f));
     const Vf far_weight = vf_mul(vf_mul(p, p), vf_add(p, p));
@@ -100,16 +99,20 @@ static int find_neighbours(const SearchJob *job, const Candidates *candidates, u
     return n;
 }
 
-static inline void entry_store_index(uint8_t *entries, uint32_t entry, bool wide, Vi offset) {
+static inline uint16_t *entry_factor(const uint8_t *entries, uint32_t entry, bool wide) {
+    return wide ? (uint16_t *)((const RowEntryWide *)entries)[entry].factor
+                : (uint16_t *)((const RowEntry *)entries)[entry].factor;
+}
+
+/* What the passes read is the rounded factor, so the sums are made of it, too. */
+static inline Vf entry_store(uint8_t *entries, uint32_t entry, bool wide, Vi offset, Vf factor) {
+    const Vi rounded = vi_round(vf_mul(factor, vf_set(FACTOR_STEPS)));
     if (wide)
         vi_store(((RowEntryWide *)entries)[entry].index, offset);
     else
         vi_store_i16(((RowEntry *)entries)[entry].index, offset);
-}
-
-static inline int16_t *entry_gradient(const uint8_t *entries, uint32_t entry, bool wide) {
-    return wide ? (int16_t *)((const RowEntryWide *)entries)[entry].gradient[0]
-                : (int16_t *)((const RowEntry *)entries)[entry].gradient[0];
+    vi_store_i16((int16_t *)entry_factor(entries, entry, wide), rounded);
+    return vf_from_int(rounded);
 }
 
 /* Turns the sixteen lists in scratch into row entries, densities and gradient sums. True if all offsets fit
@@ -134,25 +137,22 @@ static bool pack_slice(const SearchJob *job, uint32_t first, const int32_t count
         Vf nx, ny, nz;
         vf_gather4(job->position, index, &nx, &ny, &nz, &w);
         const Vf dx = vf_sub(x, nx), dy = vf_sub(y, ny), dz = vf_sub(z, nz);
+        const Vf distance_sq = vf_fma(dx, dx, vf_fma(dy, dy, vf_mul(dz, dz)));
         Vf factor, weight;
-        pair_kernel(&job->kernel, vf_fma(dx, dx, vf_fma(dy, dy, vf_mul(dz, dz))), &factor, &weight);
-        int16_t *gradient = entry_gradient(job->entries, entry, job->wide);
-        entry_store_index(job->entries, entry, job->wide, offset);
-        vf_store_i16(gradient, vf_mul(factor, dx)); /* own lanes: dx = 0 */
-        vf_store_i16(gradient + SLICE, vf_mul(factor, dy));
-        vf_store_i16(gradient + 2 * SLICE, vf_mul(factor, dz));
-        const Vf gx = vf_load_i16(gradient), gy = vf_load_i16(gradient + SLICE),
-                 gz = vf_load_i16(gradient + 2 * SLICE);
-        sum_x = vf_add(sum_x, gx);
-        sum_y = vf_add(sum_y, gy);
-        sum_z = vf_add(sum_z, gz);
-        sum_sq = vf_fma(gx, gx, vf_fma(gy, gy, vf_fma(gz, gz, sum_sq)));
+        pair_kernel(&job->kernel, distance_sq, &factor, &weight);
+        factor = entry_store(job->entries, entry, job->wide, offset, vf_mask(valid, factor));
+        sum_x = vf_fma(factor, dx, sum_x);
+        sum_y = vf_fma(factor, dy, sum_y);
+        sum_z = vf_fma(factor, dz, sum_z);
+        sum_sq = vf_fma(vf_mul(factor, factor), distance_sq, sum_sq);
         weight = vf_mask(valid, weight);
         sum_w = vf_add(sum_w, weight);
         vf_store_i16(job->weights + (size_t)entry * SLICE,
                      vf_mul(weight, vf_set(32767.0f / job->kernel.w_scale)));
     }
-    vf_store4(job->gradient_sum + first, sum_x, sum_y, sum_z, sum_sq);
+    const Vf unit = vf_set(-job->factor_unit), unit_sq = vf_mul(unit, unit);
+    vf_store4(job->gradient_sum + first, vf_mul(unit, sum_x), vf_mul(unit, sum_y), vf_mul(unit, sum_z),
+              vf_mul(unit_sq, sum_sq));
     vf_store(job->density + first, vf_mul(vf_set(job->volume), vf_add(sum_w, vf_set(job->kernel.w_scale))));
     return job->wide || misfit == 0;
 }
@@ -240,8 +240,7 @@ static bool contact_add(const BoundaryJob *job, const SampleSet *set, uint32_t s
     const Vf distance_sq = vf_fma(d[0], d[0], vf_fma(d[1], d[1], vf_mul(d[2], d[2])));
     Vf factor, weight;
     pair_kernel(&job->kernel, distance_sq, &factor, &weight);
-    /* pair_kernel's unit belongs to a fluid particle's volume: back to 1/m^4, times psi */
-    factor = vf_mul(vf_mul(factor, vf_set(job->kernel.gradient_scale / GRADIENT_STEPS)), volume);
+    factor = vf_mul(vf_mul(factor, vf_set(-job->kernel.gradient_scale * job->kernel.inv_support)), volume);
     weight = vf_mul(weight, volume);
     uint32_t left = near;
     while (left != 0) {
@@ -332,14 +331,12 @@ static int boundary(const BoundaryJob *job, uint32_t block, Scratch *scratch, ui
         if (job->density == NULL)
             continue;
         float *sum = job->gradient_sum[i];
-        const float unit = job->gradient_unit;
-        const float squares = sum[3] * unit * unit;
         float norm_sq = 0.0f;
         for (int a = 0; a < 3; a++) {
-            sum[a] = sum[a] * unit + g[a];
+            sum[a] += g[a];
             norm_sq += sum[a] * sum[a];
         }
-        sum[3] = norm_sq + squares;
+        sum[3] += norm_sq;
     }
     return contact_count;
 }
@@ -356,9 +353,7 @@ static inline Vi entry_index(const uint8_t *entries, uint32_t entry, bool wide) 
 enum { PREFETCH_ENTRIES = 48 };
 
 static inline void prefetch_entry(const uint8_t *entries, uint32_t entry, bool wide) {
-    const char *at = (const char *)entries + (size_t)entry * (wide ? sizeof(RowEntryWide) : sizeof(RowEntry));
-    __builtin_prefetch(at);
-    __builtin_prefetch(at + 64);
+    __builtin_prefetch(entries + (size_t)entry * (wide ? sizeof(RowEntryWide) : sizeof(RowEntry)));
 }
 
 /* Four floats of each neighbour of a slice. */
@@ -370,28 +365,40 @@ static inline void gather_neighbours(const Float4 *slice_base, const uint8_t *en
         vf_gather4_i16(slice_base, ((const RowEntry *)entries)[entry].index, x, y, z, w);
 }
 
+static inline void own_arm(const PairData *pairs, Vf x, Vf y, Vf z, Vf arm[3]) {
+    arm[0] = vf_sub(x, vf_set(pairs->centre[0]));
+    arm[1] = vf_sub(y, vf_set(pairs->centre[1]));
+    arm[2] = vf_sub(z, vf_set(pairs->centre[2]));
+}
+
 static inline void accelerate_slices(const PairData *pairs, const AccelerateJob *job, uint32_t block,
                                      const bool wide) {
-    const Vf unit = vf_set(job->scale * pairs->gradient_unit), scale = vf_set(job->scale);
+    const Vf unit = vf_set(-job->scale * pairs->factor_unit), scale = vf_set(job->scale);
     for (uint32_t slice = block * BLOCK_SLICES; slice < (block + 1) * BLOCK_SLICES; slice++) {
         const uint32_t first = slice * SLICE, begin = pairs->slice_start[slice];
-        const float *slice_p = job->p + first;
-        Vf x = vf_zero(), y = vf_zero(), z = vf_zero();
+        const Float4 *slice_operand = job->operand + first;
+        Vf own_x, own_y, own_z, own_p, x = vf_zero(), y = vf_zero(), z = vf_zero();
+        vf_load4(slice_operand, &own_x, &own_y, &own_z, &own_p);
         for (uint32_t entry = begin; entry < begin + pairs->slice_length[slice]; entry++) {
             prefetch_entry(pairs->entries, entry + PREFETCH_ENTRIES, wide);
-            const Vf neighbour_p = vf_gather(slice_p, entry_index(pairs->entries, entry, wide));
-            const int16_t *gradient = entry_gradient(pairs->entries, entry, wide);
-            x = vf_fma(neighbour_p, vf_load_i16(gradient), x);
-            y = vf_fma(neighbour_p, vf_load_i16(gradient + SLICE), y);
-            z = vf_fma(neighbour_p, vf_load_i16(gradient + 2 * SLICE), z);
+            Vf nx, ny, nz, p;
+            gather_neighbours(slice_operand, pairs->entries, entry, wide, &nx, &ny, &nz, &p);
+            const Vf push = vf_mul(vf_load_u16(entry_factor(pairs->entries, entry, wide)), p);
+            x = vf_fma(push, vf_sub(own_x, nx), x);
+            y = vf_fma(push, vf_sub(own_y, ny), y);
+            z = vf_fma(push, vf_sub(own_z, nz), z);
         }
         Vf gx, gy, gz, unused, bx = vf_zero(), by = vf_zero(), bz = vf_zero();
         vf_load4(pairs->gradient_sum + first, &gx, &gy, &gz, &unused);
         if (job->base != NULL)
             vf_load4(job->base + first, &bx, &by, &bz, &unused);
-        const Vf own_p = vf_mul(scale, vf_load(slice_p));
-        vf_store4(job->result + first, vf_fma(own_p, gx, vf_fma(x, unit, bx)),
-                  vf_fma(own_p, gy, vf_fma(y, unit, by)), vf_fma(own_p, gz, vf_fma(z, unit, bz)), vf_zero());
+        own_p = vf_mul(scale, own_p);
+        x = vf_fma(own_p, gx, vf_fma(x, unit, bx));
+        y = vf_fma(own_p, gy, vf_fma(y, unit, by));
+        z = vf_fma(own_p, gz, vf_fma(z, unit, bz));
+        Vf arm[3];
+        own_arm(pairs, own_x, own_y, own_z, arm);
+        vf_store4(job->result + first, x, y, z, vf_fma(arm[0], x, vf_fma(arm[1], y, vf_mul(arm[2], z))));
     }
 }
 
@@ -404,23 +411,28 @@ static void accelerate(const PairData *pairs, const AccelerateJob *job, uint32_t
 
 static inline void divergence_slices(const PairData *pairs, const Float4 *v, float *result, uint32_t block,
                                      const bool wide) {
-    const Vf unit = vf_set(-pairs->gradient_unit);
     for (uint32_t slice = block * BLOCK_SLICES; slice < (block + 1) * BLOCK_SLICES; slice++) {
         const uint32_t first = slice * SLICE, begin = pairs->slice_start[slice];
         const Float4 *slice_v = v + first;
-        Vf sum = vf_zero(), x, y, z, w;
+        Vf sum_x = vf_zero(), sum_y = vf_zero(), sum_z = vf_zero(), moments = vf_zero(), x, y, z, moment;
         for (uint32_t entry = begin; entry < begin + pairs->slice_length[slice]; entry++) {
             prefetch_entry(pairs->entries, entry + PREFETCH_ENTRIES, wide);
-            gather_neighbours(slice_v, pairs->entries, entry, wide, &x, &y, &z, &w);
-            const int16_t *gradient = entry_gradient(pairs->entries, entry, wide);
-            sum = vf_fma(x, vf_load_i16(gradient), sum);
-            sum = vf_fma(y, vf_load_i16(gradient + SLICE), sum);
-            sum = vf_fma(z, vf_load_i16(gradient + 2 * SLICE), sum);
+            gather_neighbours(slice_v, pairs->entries, entry, wide, &x, &y, &z, &moment);
+            const Vf factor = vf_load_u16(entry_factor(pairs->entries, entry, wide));
+            sum_x = vf_fma(factor, x, sum_x);
+            sum_y = vf_fma(factor, y, sum_y);
+            sum_z = vf_fma(factor, z, sum_z);
+            moments = vf_fma(factor, moment, moments);
         }
-        Vf gx, gy, gz, diagonal;
-        vf_load4(pairs->gradient_sum + first, &gx, &gy, &gz, &diagonal);
-        vf_load4(slice_v, &x, &y, &z, &w);
-        vf_store(result + first, vf_fma(x, gx, vf_fma(y, gy, vf_fma(z, gz, vf_mul(sum, unit)))));
+        Vf gx, gy, gz, unused, arm[3];
+        vf_load4(pairs->position + first, &x, &y, &z, &unused);
+        own_arm(pairs, x, y, z, arm);
+        vf_load4(pairs->gradient_sum + first, &gx, &gy, &gz, &unused);
+        vf_load4(slice_v, &x, &y, &z, &unused);
+        const Vf along =
+            vf_fma(arm[0], sum_x, vf_fma(arm[1], sum_y, vf_fma(arm[2], sum_z, vf_sub(vf_zero(), moments))));
+        vf_store(result + first,
+                 vf_fma(x, gx, vf_fma(y, gy, vf_fma(z, gz, vf_mul(along, vf_set(pairs->factor_unit))))));
     }
 }
 

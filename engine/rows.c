@@ -78,6 +78,8 @@ bool rows_build(Rows *rows, const RowsJob *build, Err *err) {
                                .count = particles->count,
                                .kernel = *build->kernel,
                                .volume = build->volume,
+                               .factor_unit = 2.0f / 65535.0f * build->volume *
+                                              build->kernel->gradient_scale * build->kernel->inv_support,
                                .wide = rows->wide,
                                .entries = rows->pool.data,
                                .frozen = build->frozen,
@@ -102,19 +104,20 @@ bool rows_build(Rows *rows, const RowsJob *build, Err *err) {
         if (status & SEARCH_NEEDS_WIDE)
             rows->wide = true;
         if (status == SEARCH_OK) {
-            rows->pairs =
-                (PairData){.count = job.count,
-                           .kernel = *build->kernel,
-                           .volume = build->volume,
-                           .gradient_unit = build->volume * build->kernel->gradient_scale / (3.0f * 32767.0f),
-                           .wide = rows->wide,
-                           .entries = job.entries,
-                           .weights = job.weights,
-                           .slice_start = job.slice_start,
-                           .slice_length = job.slice_length,
-                           .position = job.position,
-                           .density = job.density,
-                           .gradient_sum = (const Float4 *)job.gradient_sum};
+            rows->pairs = (PairData){
+                .count = job.count,
+                .kernel = *build->kernel,
+                .volume = build->volume,
+                .factor_unit = job.factor_unit,
+                .centre = {grid_centre(job.grid, 0), grid_centre(job.grid, 1), grid_centre(job.grid, 2)},
+                .wide = rows->wide,
+                .entries = job.entries,
+                .weights = job.weights,
+                .slice_start = job.slice_start,
+                .slice_length = job.slice_length,
+                .position = job.position,
+                .density = job.density,
+                .gradient_sum = (const Float4 *)job.gradient_sum};
             return true;
         }
     }

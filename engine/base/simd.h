@@ -88,6 +88,16 @@ static inline Vi vi_select(Vm m, Vi yes, Vi no) {
 static inline Vf vf_load_i16(const int16_t *p) {
     return _mm512_cvtepi32_ps(vi_load_i16(p));
 }
+static inline Vf vf_load_u16(const uint16_t *p) {
+    return _mm512_cvtepi32_ps(_mm512_cvtepu16_epi32(_mm256_loadu_si256((const __m256i *)p)));
+}
+/* to nearest even */
+static inline Vi vi_round(Vf a) {
+    return _mm512_cvtps_epi32(a);
+}
+static inline Vf vf_from_int(Vi a) {
+    return _mm512_cvtepi32_ps(a);
+}
 /* to nearest even; |a| <= 32767 */
 static inline void vf_store_i16(int16_t *p, Vf a) {
     vi_store_i16(p, _mm512_cvtps_epi32(a));
@@ -242,9 +252,14 @@ static inline Vi vi_load_i16(const int16_t *p) {
     return (Vi){_mm256_cvtepi16_epi32(_mm_loadu_si128((const __m128i *)p)),
                 _mm256_cvtepi16_epi32(_mm_loadu_si128((const __m128i *)(p + 8)))};
 }
+/* packing saturates: the low 16 bits first */
+static inline __m256i avx2_low_16(Vi v) {
+    const __m256i low = _mm256_set1_epi32(0xffff);
+    const __m256i packed = _mm256_packus_epi32(_mm256_and_si256(v.a, low), _mm256_and_si256(v.b, low));
+    return _mm256_permute4x64_epi64(packed, 0xD8);
+}
 static inline void vi_store_i16(int16_t *p, Vi v) {
-    __m256i packed = _mm256_permute4x64_epi64(_mm256_packs_epi32(v.a, v.b), 0xD8);
-    _mm256_storeu_si256((__m256i *)p, packed);
+    _mm256_storeu_si256((__m256i *)p, avx2_low_16(v));
 }
 static inline Vm vi_mask(__m256i a, __m256i b) {
     return (uint32_t)_mm256_movemask_ps(_mm256_castsi256_ps(a)) |
@@ -263,6 +278,16 @@ static inline Vi vi_select(Vm m, Vi yes, Vi no) {
 static inline Vf vf_load_i16(const int16_t *p) {
     Vi i = vi_load_i16(p);
     return VF(_mm256_cvtepi32_ps(i.a), _mm256_cvtepi32_ps(i.b));
+}
+static inline Vf vf_load_u16(const uint16_t *p) {
+    return VF(_mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(_mm_loadu_si128((const __m128i *)p))),
+              _mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(_mm_loadu_si128((const __m128i *)(p + 8)))));
+}
+static inline Vi vi_round(Vf v) {
+    return (Vi){_mm256_cvtps_epi32(v.a), _mm256_cvtps_epi32(v.b)};
+}
+static inline Vf vf_from_int(Vi v) {
+    return VF(_mm256_cvtepi32_ps(v.a), _mm256_cvtepi32_ps(v.b));
 }
 static inline void vf_store_i16(int16_t *p, Vf v) {
     vi_store_i16(p, (Vi){_mm256_cvtps_epi32(v.a), _mm256_cvtps_epi32(v.b)});
@@ -451,6 +476,26 @@ static inline Vf vf_load_i16(const int16_t *p) {
     EACH_LANE r.v[l] = (float)p[l];
     return r;
 }
+static inline Vf vf_load_u16(const uint16_t *p) {
+    Vf r;
+    EACH_LANE r.v[l] = (float)p[l];
+    return r;
+}
+static inline Vi vi_round(Vf a) {
+    Vi r;
+    EACH_LANE r.v[l] = (int32_t)lrintf(a.v[l]);
+    return r;
+}
+static inline Vf vf_from_int(Vi a) {
+    Vf r;
+    EACH_LANE r.v[l] = (float)a.v[l];
+    return r;
+}
+static inline void vi_stream_i16_pair(int16_t *p, Vi a, Vi b) {
+    EACH_LANE p[l] = (int16_t)a.v[l];
+    EACH_LANE p[LANES + l] = (int16_t)b.v[l];
+}
+static inline void simd_stream_end(void) {}
 static inline void vf_store_i16(int16_t *p, Vf a) {
     EACH_LANE p[l] = (int16_t)lrintf(a.v[l]);
 }
