@@ -104,13 +104,25 @@ static inline uint16_t *entry_factor(const uint8_t *entries, uint32_t entry, boo
                 : (uint16_t *)((const RowEntry *)entries)[entry].factor;
 }
 
-/* What the passes read is the rounded factor, so the sums are made of it, too. */
-static inline Vf entry_store(uint8_t *entries, uint32_t entry, bool wide, Vi offset, Vf factor) {
-    const Vi rounded = vi_round(vf_mul(factor, vf_set(FACTOR_STEPS)));
+/* Four floats of each neighbour of a slice. */
+static inline void gather_neighbours(const Float4 *slice_base, const uint8_t *entries, uint32_t entry,
+                                     bool wide, Vf *x, Vf *y, Vf *z, Vf *w) {
     if (wide)
-        vi_store(((RowEntryWide *)entries)[entry].index, offset);
+        vf_gather4_i32(slice_base, ((const RowEntryWide *)entries)[entry].place, x, y, z, w);
     else
-        vi_store_i16(((RowEntry *)entries)[entry].index, offset);
+        vf_gather4_i16(slice_base, ((const RowEntry *)entries)[entry].place, x, y, z, w);
+}
+
+static inline void entry_store_place(uint8_t *entries, uint32_t entry, bool wide, Vi place) {
+    if (wide)
+        vi_store(((RowEntryWide *)entries)[entry].place, place);
+    else
+        vi_store_i16(((RowEntry *)entries)[entry].place, place);
+}
+
+/* What the passes read is the rounded factor, so the sums are made of it, too. */
+static inline Vf entry_store_factor(uint8_t *entries, uint32_t entry, bool wide, Vf factor) {
+    const Vi rounded = vi_round(vf_mul(factor, vf_set(FACTOR_STEPS)));
     vi_store_i16((int16_t *)entry_factor(entries, entry, wide), rounded);
     return vf_from_int(rounded);
 }
@@ -132,15 +144,18 @@ static bool pack_slice(const SearchJob *job, uint32_t first, const int32_t count
     for (int k = 0; k < length; k++, entry++) {
         const Vm valid = vi_less(vi_set(k), count);
         const Vi index = vi_select(valid, vi_gather(scratch->list[0] + k, row_start), own);
-        const Vi offset = vi_add(index, vi_set(-(int32_t)first));
-        misfit |= vi_less(offset, vi_set(INT16_MIN)) | vi_less(vi_set(INT16_MAX), offset);
+        const Vi offset = vi_add(index, vi_set(-(int32_t)first)), place = vi_add(offset, offset);
+        misfit |= vi_less(place, vi_set(INT16_MIN)) | vi_less(vi_set(INT16_MAX), place);
+        entry_store_place(job->entries, entry, job->wide, place);
+        int32_t places[SLICE]; /* not those stored: what does not fit leads anywhere */
+        vi_store(places, place);
         Vf nx, ny, nz;
-        vf_gather4(job->position, index, &nx, &ny, &nz, &w);
+        vf_gather4_i32(job->position + first, places, &nx, &ny, &nz, &w);
         const Vf dx = vf_sub(x, nx), dy = vf_sub(y, ny), dz = vf_sub(z, nz);
         const Vf distance_sq = vf_fma(dx, dx, vf_fma(dy, dy, vf_mul(dz, dz)));
         Vf factor, weight;
         pair_kernel(&job->kernel, distance_sq, &factor, &weight);
-        factor = entry_store(job->entries, entry, job->wide, offset, vf_mask(valid, factor));
+        factor = entry_store_factor(job->entries, entry, job->wide, vf_mask(valid, factor));
         sum_x = vf_fma(factor, dx, sum_x);
         sum_y = vf_fma(factor, dy, sum_y);
         sum_z = vf_fma(factor, dz, sum_z);
@@ -343,26 +358,12 @@ static int boundary(const BoundaryJob *job, uint32_t block, Scratch *scratch, ui
 
 /* ---- The operators of the pressure solves ---- */
 
-static inline Vi entry_index(const uint8_t *entries, uint32_t entry, bool wide) {
-    return wide ? vi_load(((const RowEntryWide *)entries)[entry].index)
-                : vi_load_i16(((const RowEntry *)entries)[entry].index);
-}
-
 /* The rows are streamed once a pass, from beyond the second cache: asking this far ahead hides its latency.
  */
 enum { PREFETCH_ENTRIES = 48 };
 
 static inline void prefetch_entry(const uint8_t *entries, uint32_t entry, bool wide) {
     __builtin_prefetch(entries + (size_t)entry * (wide ? sizeof(RowEntryWide) : sizeof(RowEntry)));
-}
-
-/* Four floats of each neighbour of a slice. */
-static inline void gather_neighbours(const Float4 *slice_base, const uint8_t *entries, uint32_t entry,
-                                     bool wide, Vf *x, Vf *y, Vf *z, Vf *w) {
-    if (wide)
-        vf_gather4(slice_base, entry_index(entries, entry, true), x, y, z, w);
-    else
-        vf_gather4_i16(slice_base, ((const RowEntry *)entries)[entry].index, x, y, z, w);
 }
 
 static inline void own_arm(const PairData *pairs, Vf x, Vf y, Vf z, Vf arm[3]) {

@@ -28,13 +28,13 @@ enum {
  * quarter of the traffic of three single-precision components. The rows are streamed from memory in every
  * pass, and that is what a pass costs. Unused places point at the particle itself with factor 0. */
 typedef struct RowEntry {
-    int16_t index[SLICE];
+    int16_t place[SLICE];
     uint16_t factor[SLICE];
 } RowEntry;
 
 /* The same with room for any offset, for flows so wide that an offset may leave 16 bits. */
 typedef struct RowEntryWide {
-    int32_t index[SLICE];
+    int32_t place[SLICE];
     uint16_t factor[SLICE];
 } RowEntryWide;
 
@@ -100,6 +100,13 @@ typedef struct PairData {
     const float *density;       /* rho / rho0 */
     const Float4 *gradient_sum; /* G_i = sum_j V grad W_ij + g_i; [3]: diagonal of D D^T */
 } PairData;
+
+/* The particle in lane `lane` of an entry of the slice that begins at `first`. */
+static inline uint32_t entry_neighbour(const PairData *pairs, uint32_t first, uint32_t entry, uint32_t lane) {
+    const int32_t place = pairs->wide ? ((const RowEntryWide *)pairs->entries)[entry].place[lane]
+                                      : ((const RowEntry *)pairs->entries)[entry].place[lane];
+    return (uint32_t)((int32_t)first + place / 2);
+}
 
 typedef enum SearchStatus {
     SEARCH_OK = 0,

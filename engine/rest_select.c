@@ -41,9 +41,7 @@ int rest_row(const PairData *pairs, uint32_t i, RestNeighbour *row) {
         const int32_t weight = pairs->weights[(size_t)entry * SLICE + lane];
         if (weight == 0)
             continue;
-        const int32_t offset = pairs->wide ? ((const RowEntryWide *)pairs->entries)[entry].index[lane]
-                                           : ((const RowEntry *)pairs->entries)[entry].index[lane];
-        row[count++] = (RestNeighbour){(uint32_t)((int32_t)first + offset), weight};
+        row[count++] = (RestNeighbour){entry_neighbour(pairs, first, entry, lane), weight};
     }
     return count;
 }

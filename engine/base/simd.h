@@ -8,6 +8,7 @@
 #define SKIFF_BASE_SIMD_H
 
 #include <math.h>
+#include <stddef.h>
 #include <stdint.h>
 #include <string.h>
 
@@ -18,6 +19,10 @@
 enum { LANES = 16 };
 
 typedef float Float4[4];
+
+static inline const float *float4_at(const Float4 *base, int32_t halves) {
+    return (const float *)((const char *)base + 8 * (ptrdiff_t)halves);
+}
 
 #if defined(SIMD_AVX512)
 
@@ -116,33 +121,27 @@ static inline void vf_transpose4(__m512 r[4], Vf *x, Vf *y, Vf *z, Vf *w) {
     *z = _mm512_castpd_ps(_mm512_unpacklo_pd(_mm512_castps_pd(t1), _mm512_castps_pd(t3)));
     *w = _mm512_castpd_ps(_mm512_unpackhi_pd(_mm512_castps_pd(t1), _mm512_castps_pd(t3)));
 }
-/* Four floats each of base[index[lane]]. One 128-bit load a lane and a transpose beat four gathers by a
- * third. */
-static inline void vf_gather4(const Float4 *base, Vi index, Vf *x, Vf *y, Vf *z, Vf *w) {
-    int32_t id[LANES] __attribute__((aligned(64)));
-    _mm512_store_si512(id, index);
-
-    __m512 r[4];
-    for (int k = 0; k < 4; k++) {
-        r[k] = _mm512_castps128_ps512(_mm_loadu_ps(base[id[k]]));
-        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(base[id[4 + k]]), 1);
-        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(base[id[8 + k]]), 2);
-        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(base[id[12 + k]]), 3);
-    }
-    vf_transpose4(r, x, y, z, w);
+/* Four floats each of the sixteen Float4 that lie halves[lane] / 2 places from base. One 128-bit load a lane
+ * and a transpose beat four gathers by a third. The offsets are in memory: scalar loads leave the vector
+ * units to the transpose, while taking them out of a register costs as much as the rest. And they count half
+ * a Float4: scaled by eight an offset is part of an address, by sixteen it would need an instruction of its
+ * own. */
+#define GATHER4(base, halves, x, y, z, w)                                                                    \
+    __m512 r[4];                                                                                             \
+    for (int k = 0; k < 4; k++) {                                                                            \
+        r[k] = _mm512_castps128_ps512(_mm_loadu_ps(float4_at(base, halves[k])));                             \
+        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(float4_at(base, halves[4 + k])), 1);                    \
+        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(float4_at(base, halves[8 + k])), 2);                    \
+        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(float4_at(base, halves[12 + k])), 3);                   \
+    }                                                                                                        \
+    vf_transpose4(r, x, y, z, w)
+static inline void vf_gather4_i32(const Float4 *base, const int32_t *halves, Vf *x, Vf *y, Vf *z, Vf *w) {
+    GATHER4(base, halves, x, y, z, w);
 }
-/* The same with offsets in memory. Scalar loads of the offsets leave the vector units to the transpose:
- * taking them out of a register costs as much as the rest. */
-static inline void vf_gather4_i16(const Float4 *base, const int16_t *index, Vf *x, Vf *y, Vf *z, Vf *w) {
-    __m512 r[4];
-    for (int k = 0; k < 4; k++) {
-        r[k] = _mm512_castps128_ps512(_mm_loadu_ps(base[index[k]]));
-        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(base[index[4 + k]]), 1);
-        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(base[index[8 + k]]), 2);
-        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(base[index[12 + k]]), 3);
-    }
-    vf_transpose4(r, x, y, z, w);
+static inline void vf_gather4_i16(const Float4 *base, const int16_t *halves, Vf *x, Vf *y, Vf *z, Vf *w) {
+    GATHER4(base, halves, x, y, z, w);
 }
+#undef GATHER4
 /* Sixteen consecutive Float4 to four registers. */
 static inline void vf_load4(const Float4 *p, Vf *x, Vf *y, Vf *z, Vf *w) {
     __m512 r[4];
@@ -307,46 +306,31 @@ static inline void avx2_transpose4(const __m256 r[4], __m256 out[4]) {
     out[2] = _mm256_shuffle_ps(t1, t3, 0x44);
     out[3] = _mm256_shuffle_ps(t1, t3, 0xEE);
 }
-static inline void avx2_gather4(const Float4 *base, const int32_t *id, __m256 out[4]) {
-    __m256 r[4];
-    for (int k = 0; k < 4; k++)
-        r[k] = _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(base[id[k]])),
-                                    _mm_loadu_ps(base[id[4 + k]]), 1);
-    avx2_transpose4(r, out);
+#define GATHER4(base, halves, x, y, z, w)                                                                    \
+    __m256 out[2][4];                                                                                        \
+    for (int half = 0; half < 2; half++) {                                                                   \
+        __m256 r[4];                                                                                         \
+        for (int k = 0; k < 4; k++)                                                                          \
+            r[k] = _mm256_insertf128_ps(                                                                     \
+                _mm256_castps128_ps256(_mm_loadu_ps(float4_at(base, halves[8 * half + k]))),                 \
+                _mm_loadu_ps(float4_at(base, halves[8 * half + 4 + k])), 1);                                 \
+        avx2_transpose4(r, out[half]);                                                                       \
+    }                                                                                                        \
+    *x = VF(out[0][0], out[1][0]);                                                                           \
+    *y = VF(out[0][1], out[1][1]);                                                                           \
+    *z = VF(out[0][2], out[1][2]);                                                                           \
+    *w = VF(out[0][3], out[1][3])
+static inline void vf_gather4_i32(const Float4 *base, const int32_t *halves, Vf *x, Vf *y, Vf *z, Vf *w) {
+    GATHER4(base, halves, x, y, z, w);
 }
-static inline void vf_gather4(const Float4 *base, Vi index, Vf *x, Vf *y, Vf *z, Vf *w) {
-    int32_t id[LANES];
-    vi_store(id, index);
-    __m256 lo[4], hi[4];
-    avx2_gather4(base, id, lo);
-    avx2_gather4(base, id + 8, hi);
-    *x = VF(lo[0], hi[0]);
-    *y = VF(lo[1], hi[1]);
-    *z = VF(lo[2], hi[2]);
-    *w = VF(lo[3], hi[3]);
-}
-static inline void vf_gather4_i16(const Float4 *base, const int16_t *index, Vf *x, Vf *y, Vf *z, Vf *w) {
-    const int32_t id[LANES] = {index[0],  index[1],  index[2],  index[3], index[4],  index[5],
-                               index[6],  index[7],  index[8],  index[9], index[10], index[11],
-                               index[12], index[13], index[14], index[15]};
-    __m256 lo[4], hi[4];
-    avx2_gather4(base, id, lo);
-    avx2_gather4(base, id + 8, hi);
-    *x = VF(lo[0], hi[0]);
-    *y = VF(lo[1], hi[1]);
-    *z = VF(lo[2], hi[2]);
-    *w = VF(lo[3], hi[3]);
+static inline void vf_gather4_i16(const Float4 *base, const int16_t *halves, Vf *x, Vf *y, Vf *z, Vf *w) {
+    GATHER4(base, halves, x, y, z, w);
 }
 static inline void vf_load4(const Float4 *p, Vf *x, Vf *y, Vf *z, Vf *w) {
-    static const int32_t id[8] = {0, 1, 2, 3, 4, 5, 6, 7};
-    __m256 lo[4], hi[4];
-    avx2_gather4(p, id, lo);
-    avx2_gather4(p + 8, id, hi);
-    *x = VF(lo[0], hi[0]);
-    *y = VF(lo[1], hi[1]);
-    *z = VF(lo[2], hi[2]);
-    *w = VF(lo[3], hi[3]);
+    static const int32_t in_order[LANES] = {0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30};
+    GATHER4(p, in_order, x, y, z, w);
 }
+#undef GATHER4
 static inline void avx2_store4(Float4 *p, __m256 x, __m256 y, __m256 z, __m256 w) {
     __m256 r[4] = {x, y, z, w}, out[4];
     avx2_transpose4(r, out);
@@ -509,17 +493,23 @@ static inline Vi vi_gather(const int32_t *base, Vi index) {
     EACH_LANE r.v[l] = base[index.v[l]];
     return r;
 }
-static inline void vf_gather4(const Float4 *base, Vi index, Vf *x, Vf *y, Vf *z, Vf *w) {
+static inline void vf_gather4_i32(const Float4 *base, const int32_t *halves, Vf *x, Vf *y, Vf *z, Vf *w) {
     EACH_LANE {
-        const float *p = base[index.v[l]];
+        const float *p = float4_at(base, halves[l]);
         x->v[l] = p[0];
         y->v[l] = p[1];
         z->v[l] = p[2];
         w->v[l] = p[3];
     }
 }
-static inline void vf_gather4_i16(const Float4 *base, const int16_t *index, Vf *x, Vf *y, Vf *z, Vf *w) {
-    vf_gather4(base, vi_load_i16(index), x, y, z, w);
+static inline void vf_gather4_i16(const Float4 *base, const int16_t *halves, Vf *x, Vf *y, Vf *z, Vf *w) {
+    EACH_LANE {
+        const float *p = float4_at(base, halves[l]);
+        x->v[l] = p[0];
+        y->v[l] = p[1];
+        z->v[l] = p[2];
+        w->v[l] = p[3];
+    }
 }
 static inline void vf_load4(const Float4 *p, Vf *x, Vf *y, Vf *z, Vf *w) {
     EACH_LANE {
