@@ -47,6 +47,12 @@ typedef struct Candidates {
     int self_shift; /* place of particle i of the centre column's run is i + self_shift */
 } Candidates;
 
+/* The cell whose surroundings lie in scratch. */
+typedef struct SearchCell {
+    uint32_t index;
+    Candidates candidates;
+} SearchCell;
+
 /* Copies the particles of the 27 cells around `cell` into scratch, run by run. */
 static bool gather_candidates(const SearchJob *job, uint32_t cell, Scratch *scratch, Candidates *candidates) {
     const CellGrid *grid = job->grid;
@@ -67,7 +73,8 @@ static bool gather_candidates(const SearchJob *job, uint32_t cell, Scratch *scra
                 vf_store(scratch->x + to, x);
                 vf_store(scratch->y + to, y);
                 vf_store(scratch->z + to, z);
-                vi_store(scratch->index + to, vi_add(vi_set((int32_t)j), vi_lane()));
+                const Vi index = vi_add(vi_set((int32_t)j), vi_lane());
+                vi_store(scratch->halves + to, vi_add(index, index));
             }
             n += (int)(end - begin);
         }
@@ -92,7 +99,7 @@ static int find_neighbours(const SearchJob *job, const Candidates *candidates, u
         uint32_t valid = candidates->count - c >= LANES ? 0xffffu : (1u << (candidates->count - c)) - 1u;
         if ((unsigned)(self - c) < LANES)
             valid &= ~(1u << (self - c));
-        n += vi_compress(list + n, scratch->index + c, (Vm)(vf_less(distance_sq, limit) & valid));
+        n += vi_compress(list + n, scratch->halves + c, (Vm)(vf_less(distance_sq, limit) & valid));
         if (n > MAX_NEIGHBOURS)
             return -1;
     }
@@ -131,26 +138,21 @@ static inline Vf entry_store_factor(uint8_t *entries, uint32_t entry, bool wide,
  * 16 bits or wide. */
 static bool pack_slice(const SearchJob *job, uint32_t first, const int32_t counts[SLICE], int length,
                        uint32_t entry, const Scratch *scratch) {
-    const int32_t stride = MAX_NEIGHBOURS + LANES;
-    int32_t row_starts[SLICE];
-    for (int l = 0; l < SLICE; l++)
-        row_starts[l] = l * stride;
-    const Vi row_start = vi_load(row_starts), count = vi_load(counts);
-    const Vi own = vi_add(vi_set((int32_t)first), vi_lane());
+    const Vi count = vi_load(counts), minus_first = vi_set(-2 * (int32_t)first);
     Vf x, y, z, w;
     vf_load4(job->position + first, &x, &y, &z, &w);
     Vf sum_x = vf_zero(), sum_y = vf_zero(), sum_z = vf_zero(), sum_sq = vf_zero(), sum_w = vf_zero();
     Vm misfit = 0;
+    int32_t halves[SLICE][SLICE]; /* of the next sixteen entries, from the first particle of all */
     for (int k = 0; k < length; k++, entry++) {
+        if (k % SLICE == 0)
+            vi_transpose16(scratch->list[0] + k, MAX_NEIGHBOURS + LANES, halves);
         const Vm valid = vi_less(vi_set(k), count);
-        const Vi index = vi_select(valid, vi_gather(scratch->list[0] + k, row_start), own);
-        const Vi offset = vi_add(index, vi_set(-(int32_t)first)), place = vi_add(offset, offset);
+        const Vi place = vi_add(vi_load(halves[k % SLICE]), minus_first);
         misfit |= vi_less(place, vi_set(INT16_MIN)) | vi_less(vi_set(INT16_MAX), place);
         entry_store_place(job->entries, entry, job->wide, place);
-        int32_t places[SLICE]; /* not those stored: what does not fit leads anywhere */
-        vi_store(places, place);
         Vf nx, ny, nz;
-        vf_gather4_i32(job->position + first, places, &nx, &ny, &nz, &w);
+        vf_gather4_i32(job->position, halves[k % SLICE], &nx, &ny, &nz, &w);
         const Vf dx = vf_sub(x, nx), dy = vf_sub(y, ny), dz = vf_sub(z, nz);
         const Vf distance_sq = vf_fma(dx, dx, vf_fma(dy, dy, vf_mul(dz, dz)));
         Vf factor, weight;
@@ -172,32 +174,47 @@ static bool pack_slice(const SearchJob *job, uint32_t first, const int32_t count
     return job->wide || misfit == 0;
 }
 
+/* Lists the neighbours of a slice's particles in scratch, all to the same length: what is missing is the
+ * particle itself. Returns the length, or -1 and *fault when a particle has too many. */
+static int list_neighbours(const SearchJob *job, uint32_t first, SearchCell *cell, Scratch *scratch,
+                           int32_t counts[SLICE], uint32_t *fault) {
+    int length = 0;
+    for (uint32_t l = 0; l < SLICE; l++) {
+        const uint32_t i = first + l;
+        counts[l] = 0;
+        if (i >= job->count)
+            continue;
+        bool fits = true;
+        job->neighbours[i] = 0;
+        if (job->frozen != NULL && job->frozen[i])
+            continue;
+        if (job->cell[i] != cell->index) {
+            cell->index = job->cell[i];
+            fits = gather_candidates(job, cell->index, scratch, &cell->candidates);
+        }
+        counts[l] = fits ? find_neighbours(job, &cell->candidates, i, scratch, scratch->list[l]) : -1;
+        if (counts[l] < 0) {
+            *fault = i;
+            return -1;
+        }
+        job->neighbours[i] = (uint16_t)counts[l];
+        length = counts[l] > length ? counts[l] : length;
+    }
+    for (uint32_t l = 0; l < SLICE; l++)
+        for (int k = counts[l]; k < length; k += LANES)
+            vi_store(scratch->list[l] + k, vi_set((int32_t)(2 * (first + l))));
+    return length;
+}
+
 static int search(const SearchJob *job, uint32_t block, int thread, Scratch *scratch, uint32_t *fault) {
-    uint32_t current_cell = UINT32_MAX;
-    Candidates candidates = {0};
+    SearchCell cell = {.index = UINT32_MAX};
     int status = SEARCH_OK;
     for (uint32_t slice = block * BLOCK_SLICES; slice < (block + 1) * BLOCK_SLICES; slice++) {
         const uint32_t first = slice * SLICE;
-        int32_t counts[SLICE] = {0};
-        int length = 0;
-        for (uint32_t l = 0; l < SLICE && first + l < job->count; l++) {
-            const uint32_t i = first + l;
-            bool fits = true;
-            job->neighbours[i] = 0;
-            if (job->frozen != NULL && job->frozen[i])
-                continue;
-            if (job->cell[i] != current_cell) {
-                current_cell = job->cell[i];
-                fits = gather_candidates(job, current_cell, scratch, &candidates);
-            }
-            counts[l] = fits ? find_neighbours(job, &candidates, i, scratch, scratch->list[l]) : -1;
-            if (counts[l] < 0) {
-                *fault = i;
-                return SEARCH_TOO_DENSE;
-            }
-            job->neighbours[i] = (uint16_t)counts[l];
-            length = counts[l] > length ? counts[l] : length;
-        }
+        int32_t counts[SLICE];
+        const int length = list_neighbours(job, first, &cell, scratch, counts, fault);
+        if (length < 0)
+            return SEARCH_TOO_DENSE;
         job->slice_length[slice] = (uint16_t)length;
         job->slice_start[slice] = 0;
         if (first >= job->count) {

@@ -79,7 +79,7 @@ typedef struct SampleSet {
 /* Scratch of one thread; too large for the stack. */
 typedef struct Scratch {
     float x[MAX_CANDIDATES + LANES], y[MAX_CANDIDATES + LANES], z[MAX_CANDIDATES + LANES];
-    int32_t index[MAX_CANDIDATES + LANES];
+    int32_t halves[MAX_CANDIDATES + LANES]; /* places of the candidates as vf_gather4_i32 takes them */
     int32_t list[SLICE][MAX_NEIGHBOURS + LANES];
     Contact contacts[BLOCK * MAX_CONTACT_OBJECTS];
 } Scratch;
