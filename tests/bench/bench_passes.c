@@ -157,7 +157,7 @@ int main(int argc, char **argv) {
         neighbours += water.rows.neighbours[i];
     }
     for (uint32_t slice = 0; slice < (pairs->count + SLICE - 1) / SLICE; slice++)
-        entries += pairs->slice_length[slice];
+        entries += pairs->slices[slice].length;
     printf("%u particles, %.1f neighbours each, padding %.2f, %s\n", pairs->count,
            (double)neighbours / pairs->count, (double)entries * SLICE / (double)neighbours,
            water.passes->name);
