@@ -13,7 +13,7 @@
 enum { TAPS = 12, LANES = 8 };
 
 #define REACH_IN_RADII     4.5f
-#define THRESHOLD_IN_RADII 3.0f
+#define THRESHOLD_IN_RADII 2.0f
 #define CLEAN_IN_RADII     2.0f
 #define STRIDE_MOST        5.0f
 #define BEHIND             0.33f /* of the range: what lies far behind counts as this much behind */

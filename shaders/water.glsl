@@ -10,6 +10,7 @@ in vec2 uv;
 layout(location = 0) out vec4 color;
 
 const float NEVER = 1e9;
+const float FOAM_MOST = 2.3, FOAM_HALF = 0.6, FOAM_LEAST = 0.06;
 
 struct Water {
     float depth;  // of the eye
@@ -27,12 +28,13 @@ float fluid_part(vec2 p) {
     return edge.z > 0.0 ? part : 1.0;
 }
 
-// Foam on the ocean at local x, z, as if particles lay there: each adds to the pixels of its point as thickness.vert has it.
-float foam_left(vec2 p, float down) {
+// Foam on the sea at local x, z. What is little comes from a particle or two and would be dots.
+float foam_afloat(vec2 p) {
     vec2 t = foam_box.xy + p * foam_box.zw;
     vec2 off = abs(t - 0.5);
-    float point = 0.8 * sphere.x / sphere.w, sum = textureLod(ocean_foam, t, 0.0).r * 1.571 * point * point;
-    return max(off.x, off.y) > 0.5 ? 0.0 : sum / max(down, 0.2);
+    float sum = textureLod(ocean_foam, t, 0.0).r;
+    sum = max(off.x, off.y) > 0.5 ? 0.0 : max(sum - FOAM_LEAST, 0.0);
+    return FOAM_MOST * sum / (FOAM_HALF + sum);
 }
 
 // Without branches: software GL computes both sides of them anyway, and then merges.
@@ -41,9 +43,11 @@ Water find_water(vec3 ray, float mesh_there) {
     if (!HAS_PARTICLES && !HAS_MESHES)
         return Water(still, eye.xyz + ray * min(still, 1e5), vec3(0.0, 1.0, 0.0), 0.0);
     bool ocean = edge.z > 0.0 && still > 0.0;
-    vec4 fluid = textureLod(normal_image, uv, 0.0);
-    bool covered = fluid.w > 0.5;
+    vec4 fluid = textureLod(normal_image, uv, 0.0), nearest = texelFetch(normal_image, ivec2(uv * fluid_size.xy), 0);
+    bool covered = nearest.w > 0.5;
     fluid /= max(fluid.w, 1e-3);
+    // Between a crest and what lies behind it there is nothing.
+    fluid = abs(fluid.z - nearest.z) > sphere.x ? nearest : fluid;
     // Where no particle is, the ocean; but a hole inside the window is the inside of a boat.
     float depth = covered ? fluid.z + plane_depth(ray) : still;
     float part = fluid_part((eye.xyz + ray * depth).xz);
@@ -148,7 +152,10 @@ vec3 shade(Water water, vec3 direction, float ray_length, vec3 background, vec3 
     float through = 0.5 - 0.5 * dot(direction, sun.xyz);
     deep += vec3(0.008, 0.135, 0.125) * crest * (0.35 + 0.65 * through);
     deep += vec3(0.0, 0.020, 0.024) * min((1.0 - n.y) * 5.0, 1.5);
-    float foam = mix(ocean ? foam_left(water.place.xz, -direction.y) : 0.0, sums.g, water.fluid);
+    // What lies on the sea is known from above; sheets and crests in the air carry their own.
+    float height = water.place.y - eye.w;
+    float own_foam = ocean ? water.fluid * smoothstep(0.10, 0.30, height) : 1.0;
+    float foam = mix(ocean ? foam_afloat(water.place.xz) : 0.0, sums.g, own_foam);
     deep += vec3(0.03, 0.16, 0.16) * (1.0 - exp(-0.6 * foam)); // bubbles below
     vec4 behind = see_through(water, ray_length, bend, mix(4.0, sums.r, water.fluid),
                               ocean && direction.y < 0.0 ? deep : background);
@@ -158,7 +165,9 @@ vec3 shade(Water water, vec3 direction, float ray_length, vec3 background, vec3 
     // Sheets and drops in the air are full of small curved faces: brighter than what is behind them.
     float airborne = ocean ? smoothstep(0.16, 0.26, water.place.y - eye.w) : 0.7;
     float thin = airborne * water.fluid * (1.0 - smoothstep(0.12, 0.40, sums.r));
-    c = mix(c, vec3(0.80, 0.88, 0.92) * light, 0.5 * thin);
-    c = mix(c, vec3(0.93, 0.97, 1.0) * light, foam_cover(water.place.xz, foam, level));
+    float level_mirror = 1.0 + min(direction.y, 0.0), beyond_sq = level_mirror * level_mirror;
+    vec3 beyond = ocean ? mix(vec3(0.010, 0.135, 0.200), air, 0.7 * beyond_sq * beyond_sq * level_mirror) : c;
+    c = mix(c, mix(beyond, vec3(0.86, 0.92, 0.96) * light, 0.55), thin);
+    c = mix(c, vec3(0.93, 0.97, 1.0) * light, foam_cover(water.place.xz, foam, level) * (1.0 - 0.5 * thin));
     return ocean ? mix(c, air, 1.0 - exp(-0.0035 * max(far - 6.0, 0.0))) : c;
 }
