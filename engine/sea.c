@@ -234,6 +234,8 @@ bool sea_make(SkiffSim *sim, const SkiffDef *def, Err *err) {
         return true;
     if (!check_def(sim, def, err) || !take_def(sim, def, err) || !tile_load_default(&sim->tile, err))
         return false;
+    if (def->sea.dry)
+        return true;
     char path[PATH_SIZE] = "";
     if (def->sea.cache != NULL)
         snprintf(path, sizeof path, "%.4000s/sea-%016llx.skiff", def->sea.cache,

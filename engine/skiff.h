@@ -185,6 +185,7 @@ typedef struct SkiffSeaDef {
     bool has_region; /* absorption only where [min, max] is, m */
     float region_min[3], region_max[3];
     const char *cache; /* folder for water that was made before, or NULL */
+    bool dry;          /* no water, which takes long to make: for who only looks at shapes */
 } SkiffSeaDef;
 
 typedef enum SkiffSimd { SKIFF_SIMD_AUTO, SKIFF_SIMD_PLAIN, SKIFF_SIMD_AVX2, SKIFF_SIMD_AVX512 } SkiffSimd;
