@@ -18,7 +18,7 @@
 
 enum { STEPS = 120 };
 
-static const float pillar_size[3] = {0.3f, 2.0f, 0.3f}; /* m */
+static const float pillar_size[3] = {0.6f, 2.0f, 1.2f}; /* m */
 
 static SkiffBodyDef fixed_box(const char *name, const float size[3], float x, float z) {
     SkiffBodyDef box = skiff_body_default();
@@ -62,7 +62,7 @@ static SkiffSim *make_sea(int threads, SkiffSimd simd, double start, bool has_fi
     crate.density = 500.0f;
     crate.free_axes = SKIFF_FREE_ALL & ~SKIFF_FREE_X;
     crate.velocity[0] = (float)pull;
-    const SkiffBodyDef bodies[3] = {crate, fixed_box("pillar", pillar_size, 1.7f, 0.8f),
+    const SkiffBodyDef bodies[3] = {crate, fixed_box("pillar", pillar_size, 1.9f, 1.1f),
                                     fixed_box("rock", pillar_size, -2e4f, 3e4f)};
     def.bodies = bodies;
     def.body_count = has_fixed ? 3 : 1;
@@ -165,7 +165,7 @@ static void test_fixed_bodies(void **state) {
     SkiffSim *sim = make_sea(2, SKIFF_SIMD_AUTO, 0.0, true);
     const SkiffBody pillar = skiff_body(sim, 1);
     double deepest = -INFINITY, force = 0.0;
-    for (int k = 0; k < 2 * STEPS; k++) {
+    for (int k = 0; k < 3 * STEPS; k++) {
         run(sim, 1);
         const SkiffParticles water = skiff_particles(sim);
         for (uint32_t i = 0; i < water.count; i++) {
