@@ -17,10 +17,10 @@ typedef struct ReproduceJob {
 
 enum { REPRODUCE_BOAT_WINDOWS = 2 };
 
-/* Particle radius and length of a step: --radius changes both alike. */
+/* --radius, or without it the standard one, m. */
 double reproduce_radius(const CliArgs *args, double standard);
-/* A line of progress on stderr now and then; `row` of the experiment `what` is at `time` of `end` s. */
-void reproduce_tell(const ReproduceJob *job, const char *row, double time, double end);
+/* A line of progress on stderr, twenty times on the way to `end` (s). */
+void reproduce_tell(const ReproduceJob *job, const char *row, const SkiffSim *sim, double end);
 
 /* fig5 [Carensac2023 sec. 5.6]: series of every step. */
 bool reproduce_wedge(const ReproduceJob *job, Series *series, Err *err);

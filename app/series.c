@@ -1,6 +1,8 @@
 /* A growing CsvTable. */
 #include "series.h"
 
+#include "engine/base/file.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
