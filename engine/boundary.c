@@ -385,7 +385,6 @@ bool boundary_apply(Boundary *boundary, Rows *rows, const RowsJob *build, Err *e
                              .frozen = build->frozen,
                              .count = particles->count,
                              .kernel = rows->pairs.kernel,
-                             .gradient_unit = rows->pairs.gradient_unit,
                              .density = rows->density.data,
                              .gradient_sum = rows->gradient_sum.data,
                              .neighbours = rows->neighbours};
