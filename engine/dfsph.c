@@ -360,8 +360,12 @@ static double gcr_update(Dfsph *dfsph, const DfsphProblem *problem, float *p, fl
             EACH_LANE {
                 d[l] = z[l] - beta * d[l];
                 q[l] = w[l] - beta * q[l];
-                const float next = pressure[l] + alpha * d[l];
-                cut.lane[l] += next < 0.0f ? -next / inv[l] : 0.0f;
+                /* What has left the active set stays in the direction until that is begun anew: it must not
+                 * come back by it. Two drops that barely touch would go apart at 200 m/s. */
+                const bool active = pressure[l] > 0.0f || r[l] > 0.0f;
+                const float step = alpha * d[l], next = active ? pressure[l] + step : 0.0f;
+                const float excess = next < 0.0f ? -next : active || step < 0.0f ? 0.0f : step;
+                cut.lane[l] += excess > 0.0f ? excess / inv[l] : 0.0f;
                 pressure[l] = next < 0.0f ? 0.0f : next;
                 r[l] = inv[l] > 0.0f ? r[l] - alpha * q[l] : 0.0f;
             }
