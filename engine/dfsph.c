@@ -360,10 +360,17 @@ static double gcr_update(Dfsph *dfsph, const DfsphProblem *problem, float *p, fl
             EACH_LANE {
                 d[l] = z[l] - beta * d[l];
                 q[l] = w[l] - beta * q[l];
-                const float next = pressure[l] + alpha * d[l];
-                cut.lane[l] += next < 0.0f ? -next / inv[l] : 0.0f;
-                pressure[l] = next < 0.0f ? 0.0f : next;
-                r[l] = inv[l] > 0.0f ? r[l] - alpha * q[l] : 0.0f;
+                /* What has left the active set stays in the direction until that is begun anew, but must not
+                 * come back by it; and what P >= 0 does not allow has not changed the particle's own
+                 * residual either. Two drops that barely touch went apart at 200 m/s without this: their
+                 * diagonal is tiny and their steps are huge. */
+                const bool active = pressure[l] > 0.0f || r[l] > 0.0f;
+                const float step = alpha * d[l], next = pressure[l] + step;
+                const float lost = !active ? step : next < 0.0f ? next : 0.0f;
+                const float correction = inv[l] > 0.0f ? lost / inv[l] : 0.0f;
+                cut.lane[l] += fabsf(correction);
+                pressure[l] = active && next > 0.0f ? next : 0.0f;
+                r[l] = inv[l] > 0.0f ? r[l] - alpha * q[l] + correction : 0.0f;
             }
             error_lanes(r, pressure, &one, &two);
             precondition_lanes(r, pressure, inv, z, dfsph->operand + first);

@@ -14,7 +14,7 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
-enum { FITTED_VERSION = 1, PATH_SIZE = 4096 };
+enum { FITTED_VERSION = 2, PATH_SIZE = 4096 };
 
 /* ---- Storage ---- */
 
