@@ -28,7 +28,7 @@ typedef enum RestKind {
 enum { REST_RULE_BASE, REST_RULE_REGULATOR, REST_RULE_PROTECTION };
 enum { REST_PROTECTOR_MARKED, REST_PROTECTOR_DENSER, REST_PROTECTOR_PRINTED };
 enum { REST_SCHEDULE_CONSTANT, REST_SCHEDULE_PRINTED };
-enum { REST_SETTLE_ALL, REST_SETTLE_CANDIDATES };
+enum { REST_SETTLE_ALL, REST_SETTLE_CANDIDATES, REST_SETTLE_SHELL };
 
 /* Where water shall be. All of it window-local. */
 /* STILL: water that is known to touch nothing it does not fit. */
@@ -79,8 +79,6 @@ void rest_cloud_free(RestCloud *cloud);
 bool rest_gather(struct SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err);
 bool rest_select(struct SkiffSim *sim, SkiffFill *fill, Err *err);
 bool rest_settle(struct SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err);
-/* The same for the simulation's particles with ids from `first_id` on; all others are held. */
-bool rest_settle_all(struct SkiffSim *sim, float surface, uint64_t first_id, SkiffFill *fill, Err *err);
 /* Sorts the cloud, freezes what is of no kind in `evaluated` (bits 1 << RestKind), and makes rows and
  * boundary terms of the rest. */
 bool rest_search(struct SkiffSim *sim, uint32_t evaluated, Err *err);
