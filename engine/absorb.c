@@ -50,16 +50,11 @@ static float wall_density(const SkiffSim *sim, const float p[3]) {
     return (float)sum;
 }
 
-/* Distance from where water may come in and go. */
-static float absorb_distance(const SkiffSim *sim, const float p[3], float normal[3]) {
-    return sim->sea.water_edge ? edge_distance(sim, p, normal) : shape_distance_sides(&sim->tank, p, normal);
-}
-
 /* For water_gather: along the inside of an edge of water. */
 static float outside_layer(const void *user, const float p[3]) {
     const SkiffSim *sim = user;
     const float layer = sim->params.inflow_layer * sim->params.particle_radius;
-    const float distance = edge_distance(sim, p, NULL);
+    const float distance = shape_distance_sides(&sim->tank, p, NULL);
     return fmaxf(distance, -layer - distance);
 }
 
@@ -91,7 +86,7 @@ bool absorb_make(SkiffSim *sim, Err *err) {
     for (uint32_t i = 0; i < source->count; i++) {
         const float *p = source->position[i];
         float normal[3];
-        if (p[1] >= level || !in_region(sea, p) || absorb_distance(sim, p, normal) < -layer)
+        if (p[1] >= level || !in_region(sea, p) || shape_distance_sides(&sim->tank, p, normal) < -layer)
             continue;
         memcpy(sea->inlets[count], p, 3 * sizeof(float));
         sea->inlets[count][3] = sea->water_edge ? 0.0f : wall_density(sim, p);
@@ -193,12 +188,19 @@ static bool let_out(SkiffSim *sim, Err *err) {
     Particles *particles = &sim->particles;
     const float level = (float)(sea->level - sim->origin[1]);
     const float layer = sim->params.outflow_distance * sim->params.particle_radius;
+    if (!buffer_reserve(&sim->sea.distance_buffer, "distances to the edge",
+                        (size_t)particles->capacity * sizeof(float), err))
+        return false;
+    float *distance = sea->distance_buffer.data;
+    shape_distances_sides(&sim->tank, (const float(*)[4])particles->position, particles->count, distance,
+                          sim->threads);
+    /* from the last to the first: who takes the place of one that goes has been looked at */
     for (uint32_t i = particles->count; i-- > 0;) {
         const float *p = particles->position[i];
         if (particles->edge[i] != EDGE_NONE)
             continue;
         /* above the surface near the edge; and what has got through or over the walls */
-        const float depth = !in_region(sea, p) ? INFINITY : -absorb_distance(sim, p, NULL);
+        const float depth = !in_region(sea, p) ? INFINITY : -distance[i];
         if (!(depth < (p[1] > level ? layer : -sim->params.particle_radius)))
             continue;
         if (!ghosts_reserve(&sim->ghosts, 1, sim->time, err))

@@ -32,6 +32,7 @@ static const float PART_SHARE = 0.1f;
 /* Share of a density error that a step corrects, and of the velocity that it keeps, while a column settles.
  */
 static const float COLUMN_SOFTENING = 0.25f, COLUMN_RETENTION = 0.8f;
+enum { COLUMN_STEPS = 6000 };
 
 /* What settles, and with what. */
 typedef struct Settle {
@@ -412,7 +413,8 @@ bool rest_settle_column(SkiffSim *sim, double period, SkiffFill *fill, Err *err)
     settle.params.rest_time_scale = 1.0f;
     settle.params.rest_softening = COLUMN_SOFTENING;
     settle.params.rest_retention = COLUMN_RETENTION;
-    settle.params.rest_steps = settle.params.sea_steps;
+    settle.params.rest_max_speed = 0.0f;
+    settle.params.rest_steps = COLUMN_STEPS;
     const bool good = run_steps(&settle, search_column, 0, fill, err);
     wrap_column(&settle, sim->rest.order.data);
     return good;

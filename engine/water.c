@@ -1,12 +1,9 @@
-/* The column is made from the tile: cut at the surface, its upper part settles (rest_settle_column) over the
- * rest of the tile, which is at rest as it comes and goes on below. */
+/* The surface is made from the tile: cut, its upper part settles (rest_settle_column) over the rest of it. A
+ * column is that surface with the tile below, which is at rest as it comes. */
 #include "water.h"
 #include "sim.h"
 
 #include <math.h>
-
-/* How deep the surface is felt, supports. */
-static const float SETTLED = 8.0f;
 
 /* ---- Making ---- */
 
@@ -37,9 +34,10 @@ static bool lay_column(SkiffSim *sim, double period, float depth, Column *column
     return true;
 }
 
+/* P of still water, of a depth of a radius at least. */
 static float still_pressure(const SkiffSim *sim, float y) {
     const float dt = sim->params.time_step;
-    return sim->params.gravity[1] * y * dt * dt;
+    return sim->params.gravity[1] * fminf(y, -sim->params.particle_radius) * dt * dt;
 }
 
 static bool list_add(WaterList *list, const float position[3], const float pressure[2], Err *err) {
@@ -56,25 +54,6 @@ static bool list_add(WaterList *list, const float position[3], const float press
     memcpy(water->position[water->count], position, 3 * sizeof(float));
     water->position[water->count][3] = 0.0f;
     memcpy(water->pressure[water->count++], pressure, sizeof(float[2]));
-    return true;
-}
-
-/* The upper part goes into the simulation to settle, the lower one into the list. */
-static bool share_out(SkiffSim *sim, const Column *column, WaterList *list, Err *err) {
-    const float settled = -SETTLED * sim->kernel.support, held = settled - sim->kernel.support;
-    if (!sim_reserve(sim, 4 * column->count + SLICE, err))
-        return false;
-    for (uint32_t i = 0; i < column->count; i++) {
-        const float *p = column->position[i];
-        const float pressure[2] = {still_pressure(sim, p[1]) * sim->tile.share[column->source[i]], 0.0f};
-        if (p[1] < settled && !list_add(list, p, pressure, err))
-            return false;
-        if (p[1] < held)
-            continue;
-        const uint32_t to = particles_append(&sim->particles, p, (const float[3]){0}, 0.0);
-        sim->particles.pressure[to] = pressure[0];
-        sim->particles.edge[to] = p[1] < settled ? EDGE_LAID : EDGE_NONE;
-    }
     return true;
 }
 
@@ -110,44 +89,100 @@ static bool sort_column(StillWater *water, const WaterList *list, Err *err) {
     return true;
 }
 
-static bool settle_column(SkiffSim *sim, StillWater *water, const Column *column, WaterList *list, Err *err) {
-    SkiffFill fill = {0};
-    if (!share_out(sim, column, list, err) || !rest_settle_column(sim, water->period, &fill, err))
-        return false;
-    const Particles *particles = &sim->particles;
-    for (uint32_t i = 0; i < particles->count; i++)
-        if (particles->edge[i] == EDGE_NONE &&
-            !list_add(list, particles->position[i],
-                      (const float[2]){particles->pressure[i], particles->pressure_divergence[i]}, err))
+/* y of a surface's floor: a radius below what settles, so that nobody sinks through it. */
+static float surface_floor(const SkiffSim *sim) {
+    return -WATER_SETTLED * sim->kernel.support - sim->params.particle_radius;
+}
+
+/* The tile below, the surface above. */
+static bool list_column(const SkiffSim *sim, const Column *column, const RestTile *surface, WaterList *list,
+                        Err *err) {
+    const float r = sim->params.particle_radius, bottom = -WATER_SETTLED * sim->kernel.support;
+    const float floor = surface_floor(sim);
+    for (uint32_t i = 0; i < column->count; i++) {
+        const float *p = column->position[i];
+        const float pressure[2] = {still_pressure(sim, p[1]) * sim->tile.share[column->source[i]], 0.0f};
+        if (p[1] < bottom && !list_add(list, p, pressure, err))
             return false;
+    }
+    for (uint32_t i = 0; i < surface->count; i++) {
+        const float p[3] = {r * surface->position[i][0], floor + r * surface->position[i][1],
+                            r * surface->position[i][2]};
+        const float pressure[2] = {still_pressure(sim, p[1]) * surface->share[i], 0.0f};
+        if (!list_add(list, p, pressure, err))
+            return false;
+    }
     return true;
 }
 
 bool water_make(StillWater *water, SkiffSim *sim, float depth, Err *err) {
     const float support = sim->kernel.support;
-    const double radius = (double)sim->params.particle_radius;
     Column column;
     WaterList list = {0};
-    water->period = (double)sim->tile.size[0] * radius;
+    RestTile surface;
+    if (!tile_load_surface(&surface, err))
+        return false;
+    water->period = (double)sim->tile.size[0] * (double)sim->params.particle_radius;
     water->across = (int32_t)floor(water->period / (double)support);
     water->cell = (float)(water->period / water->across);
     water->top = support;
-    depth = fmaxf(depth, (SETTLED + 1.0f) * support) + support;
+    depth = fmaxf(depth, WATER_SETTLED * support) + support;
     water->layers = (int32_t)ceilf((depth + water->top) / water->cell);
-    if (sim->tile.size[2] != sim->tile.size[0] || water->across < 2)
-        return err_set(err, ERR_INPUT, "the sea needs a tile as long as it is wide, at least 8 r; it is %g x %g r",
-                       (double)sim->tile.size[0], (double)sim->tile.size[2]);
-    const int body_count = sim->body_count;
-    const BoundarySet moving = sim->boundary.moving;
-    sim->body_count = 0;
-    sim->boundary.moving = (BoundarySet){0};
     const bool good = lay_column(sim, water->period, depth, &column, err) &&
-                      settle_column(sim, water, &column, &list, err) && sort_column(water, &list, err);
-    sim->boundary.moving = moving;
-    sim->body_count = body_count;
+                      list_column(sim, &column, &surface, &list, err) && sort_column(water, &list, err);
+    tile_free(&surface);
+    water_list_free(&list);
+    return good;
+}
+
+/* ---- The surface ---- */
+
+/* What settles, over a support of the tile that stands still. */
+static bool place_surface(SkiffSim *sim, const Column *column, Err *err) {
+    const float bottom = -WATER_SETTLED * sim->kernel.support;
+    if (!sim_reserve(sim, column->count, err))
+        return false;
+    for (uint32_t i = 0; i < column->count; i++) {
+        const float *p = column->position[i];
+        const uint32_t to = particles_append(&sim->particles, p, (const float[3]){0}, 0.0);
+        sim->particles.pressure[to] = still_pressure(sim, p[1]) * sim->tile.share[column->source[i]];
+        sim->particles.edge[to] = p[1] < bottom ? EDGE_LAID : EDGE_NONE;
+    }
+    return true;
+}
+
+static bool take_surface(const SkiffSim *sim, double period, RestTile *surface, Err *err) {
+    const Particles *particles = &sim->particles;
+    const float r = sim->params.particle_radius, floor = surface_floor(sim);
+    if (!tile_init(surface, particles->count, err))
+        return false;
+    surface->volume_factor = sim->tile.volume_factor;
+    surface->size[0] = surface->size[2] = (float)(period / (double)r);
+    surface->size[1] = (sim->kernel.support - floor) / r;
+    surface->count = 0;
+    for (uint32_t i = 0; i < particles->count; i++) {
+        const float *p = particles->position[i];
+        if (particles->edge[i] != EDGE_NONE)
+            continue;
+        float *to = surface->position[surface->count];
+        for (int k = 0; k < 3; k++)
+            to[k] = fminf((k == 1 ? p[1] - floor : p[k]) / r, nextafterf(surface->size[k], 0.0f));
+        surface->share[surface->count++] = particles->pressure[i] / still_pressure(sim, p[1]);
+    }
+    return true;
+}
+
+bool water_make_surface(SkiffSim *sim, RestTile *surface, Err *err) {
+    const double period = (double)sim->tile.size[0] * (double)sim->params.particle_radius;
+    Column column;
+    SkiffFill fill = {0};
+    *surface = (RestTile){0};
+    const bool good =
+        lay_column(sim, period, (WATER_SETTLED + 1) * sim->kernel.support, &column, err) &&
+        place_surface(sim, &column, err) && rest_settle_column(sim, period, &fill, err) &&
+        take_surface(sim, period, surface, err);
     sim->particles.count = 0;
     sim->particles.next_id = 0;
-    water_list_free(&list);
     return good;
 }
 
