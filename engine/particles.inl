@@ -7,3 +7,4 @@ PARTICLE_FIELD(pressure_divergence, float, 1, STATE_F32) /* the same of the dive
 PARTICLE_FIELD(prediction, float, 1, STATE_F32)          /* rho / rho0 that the last density solve expected now; 0: none */
 PARTICLE_FIELD(id, uint64_t, 1, STATE_U64)               /* never reused */
 PARTICLE_FIELD(birth, double, 1, STATE_F64)              /* s */
+PARTICLE_FIELD(edge, uint8_t, 1, STATE_U8)                /* of a window: ParticleEdge */

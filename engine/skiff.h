@@ -489,6 +489,9 @@ SkiffTile *skiff_tile_make(const SkiffTileDef *def, Err *err);
 /* The particles inside [min, max] (m, world) as a block. NULL with ERR_INPUT: none is, or the box is too
  * small for a particle with all its neighbours. */
 SkiffTile *skiff_tile_cut(const SkiffSim *sim, const double min[3], const double max[3], Err *err);
+/* The built-in tile settled under a free surface, as a block whose sides repeat: what a sea is made of. Takes a
+ * minute. */
+SkiffTile *skiff_tile_surface(int threads, Err *err);
 /* Reads a file; path NULL: the tile that comes with the program. NULL with ERR_INPUT or ERR_IO. */
 SkiffTile *skiff_tile_open(const char *path, Err *err);
 bool skiff_tile_save(const SkiffTile *tile, const char *path, Err *err);
