@@ -48,6 +48,8 @@ typedef struct SkiffDriveDef {
 #undef PARAM_ENUM
 
 /* Values of the enums of drive.inl, in the order of their names. */
+/* The same of params.inl. */
+enum { SKIFF_SOLVER_GCR, SKIFF_SOLVER_JACOBI, SKIFF_SOLVER_SPLIT };
 enum { SKIFF_THRUST_AT_CENTRE, SKIFF_THRUST_AT_PROPELLER };
 enum { SKIFF_STEERING_TORQUE, SKIFF_STEERING_RUDDER };
 enum { SKIFF_HOLD_PROPORTIONAL, SKIFF_HOLD_BANGBANG };
@@ -366,7 +368,7 @@ typedef struct SkiffStats {
     double time, dt; /* s, at the end of the step */
     uint32_t particles, boundary_samples, contacts;
     uint32_t particles_in[SKIFF_IN_COUNT], particles_out[SKIFF_OUT_COUNT]; /* during the step, by cause */
-    bool moved; /* the window moved in this step */
+    bool moved;                                                            /* the window moved in this step */
     int density_iterations, divergence_iterations;
     double density_error_percent; /* mean over all particles of max(0, rho/rho0 - 1), found at the start of
                                      the step: what the last one left */
@@ -489,8 +491,8 @@ SkiffTile *skiff_tile_make(const SkiffTileDef *def, Err *err);
 /* The particles inside [min, max] (m, world) as a block. NULL with ERR_INPUT: none is, or the box is too
  * small for a particle with all its neighbours. */
 SkiffTile *skiff_tile_cut(const SkiffSim *sim, const double min[3], const double max[3], Err *err);
-/* The built-in tile settled under a free surface, as a block whose sides repeat: what a sea is made of. Takes a
- * minute. */
+/* The built-in tile settled under a free surface, as a block whose sides repeat: what a sea is made of. Takes
+ * a minute. */
 SkiffTile *skiff_tile_surface(int threads, Err *err);
 /* Reads a file; path NULL: the tile that comes with the program. NULL with ERR_INPUT or ERR_IO. */
 SkiffTile *skiff_tile_open(const char *path, Err *err);
