@@ -156,7 +156,7 @@ static void try_inlet(const SkiffSim *sim, uint32_t index, float flow[4]) {
     }
     weight_sum += (double)p[3]; /* the walls, which stand still */
     if (weight_sum + (double)(sim->volume * sim->kernel.w_scale) > (double)sim->params.inflow_density ||
-        body_is_near(sim, p, distance))
+        body_is_near(sim, p, distance) || rest_clearance(sim, p, false) < 0.0f)
         return;
     for (int k = 0; k < 3; k++)
         flow[k] = weight_sum > 0.0 ? (float)(sum[k] / weight_sum) : 0.0f;
