@@ -13,8 +13,9 @@
 static const float CATCH_TIME = 0.05f;
 /* Where the edge ends rounding decides who belongs to it: the same particle is closer than this, r. */
 static const float SAME = 0.5f;
-/* Laid water comes no closer than this to caught water; r. */
-static const float APART = 1.5f;
+/* Laid water comes no closer than this to caught water, r: at rest the particles of the surface come as close
+ * as 1.0. */
+static const float APART = 0.9f;
 /* How far beyond the old edge particles of it can lie in the way, r. */
 static const float RIM = 2.0f;
 

@@ -1,5 +1,5 @@
-/* A window that moves gives the same state whatever computes it, also after a save and resume, and keeps its
- * water.
+/* A window that moves, with an edge of water or of walls, gives the same state whatever computes it, also
+ * after a save and resume, and keeps its water.
  *
  * Scene: a small star-shaped window over 0.4 m of still water follows a floating crate that is pulled, 120
  * steps with several moves, absorption on. */
@@ -9,7 +9,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 
-#include "skiff.h"
+#include "engine/sim.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -18,12 +18,13 @@
 
 enum { STEPS = 120 };
 
-static SkiffSim *make(int threads, SkiffSimd simd, double start) {
+static SkiffSim *make_edged(int threads, SkiffSimd simd, double start, int edge) {
     static const double pull = 2.6; /* m/s */
     SkiffDef def = skiff_def_default();
     Err err = {0};
     def.threads = threads;
     def.simd = simd;
+    def.params.window_edge = edge;
     def.params.particle_radius = 0.04f;
     def.params.time_step = 0.005f;
     def.params.sea_steps = 10;
@@ -56,6 +57,10 @@ static SkiffSim *make(int threads, SkiffSimd simd, double start) {
     return sim;
 }
 
+static SkiffSim *make(int threads, SkiffSimd simd, double start) {
+    return make_edged(threads, simd, start, WINDOW_EDGE_WATER);
+}
+
 static void run(SkiffSim *sim, int steps) {
     Err err = {0};
     for (int k = 0; k < steps; k++)
@@ -63,8 +68,8 @@ static void run(SkiffSim *sim, int steps) {
             fail_msg("%s", err.message);
 }
 
-static uint64_t hash_of(int threads, SkiffSimd simd) {
-    SkiffSim *sim = make(threads, simd, 0.0);
+static uint64_t hash_of(int threads, SkiffSimd simd, int edge) {
+    SkiffSim *sim = make_edged(threads, simd, 0.0, edge);
     run(sim, STEPS);
     SkiffWindow window;
     assert_true(skiff_window(sim, &window));
@@ -76,9 +81,11 @@ static uint64_t hash_of(int threads, SkiffSimd simd) {
 
 static void test_threads_and_instruction_sets(void **state) {
     (void)state;
-    const uint64_t expected = hash_of(1, SKIFF_SIMD_PLAIN);
+    const uint64_t expected = hash_of(1, SKIFF_SIMD_PLAIN, WINDOW_EDGE_WATER);
     for (int threads = 2; threads <= 3; threads++)
-        assert_int_equal(hash_of(threads, SKIFF_SIMD_AUTO), expected);
+        assert_int_equal(hash_of(threads, SKIFF_SIMD_AUTO, WINDOW_EDGE_WATER), expected);
+    assert_int_equal(hash_of(3, SKIFF_SIMD_AUTO, WINDOW_EDGE_WALLS),
+                     hash_of(1, SKIFF_SIMD_PLAIN, WINDOW_EDGE_WALLS));
 }
 
 static void test_save_and_resume(void **state) {
