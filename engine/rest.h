@@ -28,7 +28,7 @@ typedef enum RestKind {
 enum { REST_RULE_BASE, REST_RULE_REGULATOR, REST_RULE_PROTECTION };
 enum { REST_PROTECTOR_MARKED, REST_PROTECTOR_DENSER, REST_PROTECTOR_PRINTED };
 enum { REST_SCHEDULE_CONSTANT, REST_SCHEDULE_PRINTED };
-enum { REST_SETTLE_ALL, REST_SETTLE_CANDIDATES };
+enum { REST_SETTLE_ALL, REST_SETTLE_CANDIDATES, REST_SETTLE_SHELL };
 
 struct SkiffSim;
 
@@ -77,15 +77,10 @@ typedef struct RestCloud {
 bool rest_fill(struct SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err);
 void rest_cloud_free(RestCloud *cloud);
 
-/* Loads the simulation's tile if it has none, and checks that its params suit it. */
-bool rest_check_tile(struct SkiffSim *sim, Err *err);
-
 /* The stages of rest_fill. */
 bool rest_gather(struct SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err);
 bool rest_select(struct SkiffSim *sim, SkiffFill *fill, Err *err);
 bool rest_settle(struct SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err);
-/* The same for the simulation's particles with ids from `first_id` on; all others are held. */
-bool rest_settle_all(struct SkiffSim *sim, float surface, uint64_t first_id, SkiffFill *fill, Err *err);
 /* The simulation's particles are a column of water, x and z in [0, period), that goes on periodically: all
  * but the edge settles. */
 bool rest_settle_column(struct SkiffSim *sim, double period, SkiffFill *fill, Err *err);

@@ -14,7 +14,7 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
-enum { FITTED_VERSION = 1, PATH_SIZE = 4096 };
+enum { FITTED_VERSION = 2, PATH_SIZE = 4096 };
 
 /* ---- Storage ---- */
 
@@ -265,6 +265,8 @@ bool sea_make(SkiffSim *sim, const SkiffDef *def, Err *err) {
         return true;
     if (!check_def(sim, def, err) || !take_def(sim, def, err) || !rest_check_tile(sim, err))
         return false;
+    if (def->sea.dry)
+        return true;
     if (sim->sea.water_edge)
         return fill_edged(sim, err);
     char path[PATH_SIZE] = "";

@@ -309,6 +309,17 @@ static bool choose_domain(SkiffSim *sim, const SkiffDef *def, Err *err) {
     return true;
 }
 
+/* A window sails away from bodies that stay, and their samples would span the whole way. */
+static void limit_bodies(SkiffSim *sim) {
+    BoundarySet *moving = &sim->boundary.moving;
+    moving->has_reach = true;
+    moving->reach = sim->domain;
+    for (int k = 0; k < 3; k++) {
+        moving->reach.min[k] -= sim->kernel.support;
+        moving->reach.max[k] += sim->kernel.support;
+    }
+}
+
 static uint64_t hash_def(const SkiffSim *sim, const SkiffDef *def) {
     XXH3_state_t state;
     XXH3_64bits_reset(&state);
@@ -322,6 +333,8 @@ static uint64_t hash_def(const SkiffSim *sim, const SkiffDef *def) {
         XXH3_64bits_update(&state, &sim->bodies[b].mass, sizeof(double));
         XXH3_64bits_update(&state, &sim->bodies[b].free_axes, sizeof(uint32_t));
         XXH3_64bits_update(&state, &sim->bodies[b].release_time, sizeof(double));
+        XXH3_64bits_update(&state, &sim->bodies[b].stop_time, sizeof(double));
+        XXH3_64bits_update(&state, &sim->bodies[b].ramp_time, sizeof(double));
     }
     for (int b = 0; b < def->block_count; b++) {
         XXH3_64bits_update(&state, def->blocks[b].start, 6 * sizeof(float));
@@ -382,7 +395,10 @@ static bool build(SkiffSim *sim, const SkiffDef *def, Err *err) {
         good = make_body(sim, def, sim->body_count, err) && good;
     good = good && drives_make(sim, def, err) && check_overlaps(sim, def, err) &&
            choose_domain(sim, def, err) && boundary_weigh(&sim->boundary.fixed, &sim->kernel, err) &&
-           sim_reserve(sim, (uint32_t)particles, err) &&
+           sim_reserve(sim, (uint32_t)particles, err);
+    if (good)
+        limit_bodies(sim);
+    good = good &&
            boundary_place(&sim->boundary, sim->bodies, sim->body_count, sim->origin, sim->kernel.support,
                           sim->threads, err) &&
            sea_make(sim, def, err) && block_emit(sim, &sim->stats.particles_in[SKIFF_IN_EMITTED], err) &&

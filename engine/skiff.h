@@ -151,6 +151,8 @@ typedef struct SkiffBodyDef {
     float angular_velocity[3]; /* rad/s, world axes */
     uint32_t free_axes;        /* 0: static or prescribed */
     double release_time; /* s; until then the body is held still in every axis that is free afterwards */
+    double stop_time;    /* s; from then on it is held still in every axis; INFINITY: never */
+    double ramp_time; /* s; velocities of axes that are not free rise from 0 between the times 0 and this */
     const SkiffDriveDef *drive; /* NULL: none */
 } SkiffBodyDef;
 
@@ -187,6 +189,7 @@ typedef struct SkiffSeaDef {
     bool has_region; /* absorption only where [min, max] is, m */
     float region_min[3], region_max[3];
     const char *cache; /* folder for water that was made before, or NULL */
+    bool dry;          /* no water, which takes long to make: for who only looks at shapes */
 } SkiffSeaDef;
 
 typedef enum SkiffSimd { SKIFF_SIMD_AUTO, SKIFF_SIMD_PLAIN, SKIFF_SIMD_AVX2, SKIFF_SIMD_AVX512 } SkiffSimd;
@@ -365,7 +368,7 @@ typedef struct SkiffStats {
     double time, dt; /* s, at the end of the step */
     uint32_t particles, boundary_samples, contacts;
     uint32_t particles_in[SKIFF_IN_COUNT], particles_out[SKIFF_OUT_COUNT]; /* during the step, by cause */
-    bool moved; /* the window moved in this step; never so far: there is no window yet */
+    bool moved; /* the window moved in this step */
     int density_iterations, divergence_iterations;
     double density_error_percent; /* mean over all particles of max(0, rho/rho0 - 1), found at the start of
                                      the step: what the last one left */
