@@ -324,8 +324,8 @@ static const Command commands[] = {
      "Cuts the tile that is part of the program at a level and lets what is left settle there, repeating\n"
      "without end to all sides. The sea ahead of a window is made of it and of the tile below. The surface\n"
      "itself is part of the program, too; it has to be made anew when the tile is.\n",
-     "  skiff rest surface -o assets/rest/surface.skiff\n",
-     rest_surface_options, COUNT(rest_surface_options), rest_surface_command},
+     "  skiff rest surface -o assets/rest/surface.skiff\n", rest_surface_options, COUNT(rest_surface_options),
+     rest_surface_command},
     {"rest cut", "folder", true, "DIR -o FILE", "Cut a block of water at rest out of a finished run",
      "Takes the particles of a box out of the last state of a run, a tank that has settled, and prints how "
      "much\n"

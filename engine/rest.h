@@ -81,8 +81,8 @@ void rest_cloud_free(RestCloud *cloud);
 bool rest_gather(struct SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err);
 bool rest_select(struct SkiffSim *sim, SkiffFill *fill, Err *err);
 bool rest_settle(struct SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err);
-/* The simulation's particles are a column of water, x and z in [0, period), that goes on periodically: all but
- * the edge settles. */
+/* The simulation's particles are a column of water, x and z in [0, period), that goes on periodically: all
+ * but the edge settles. */
 bool rest_settle_column(struct SkiffSim *sim, double period, SkiffFill *fill, Err *err);
 /* Sorts the cloud, freezes what is of no kind in `evaluated` (bits 1 << RestKind), and makes rows and
  * boundary terms of the rest. */

@@ -486,7 +486,7 @@ static void show(SkiffSim *sim, uint64_t first_id, bool all) {
     sim_add_pressures(sim);
 }
 
-static bool check_tile(SkiffSim *sim, Err *err) {
+bool rest_check_tile(SkiffSim *sim, Err *err) {
     if (sim->tile.count == 0 && !tile_load_default(&sim->tile, err))
         return false;
     const double own = (double)sim->params.volume_factor, needed = sim->tile.volume_factor;
@@ -503,7 +503,8 @@ bool rest_fill(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *
     const uint32_t count = sim->particles.count;
     const bool all = sim->params.rest_settle != REST_SETTLE_CANDIDATES;
     const double start = timer_ms();
-    if ((request->fitted == NULL && !check_tile(sim, err)) || (all && count > 0 && !keep_existing(sim, err)))
+    if ((request->fitted == NULL && !rest_check_tile(sim, err)) ||
+        (all && count > 0 && !keep_existing(sim, err)))
         return false;
     bool good = rest_gather(sim, request, fill, err);
     const double gathered = timer_ms();
