@@ -211,6 +211,14 @@ static const Option rest_make_options[] = {
     OPTION_ROW_HELP,
 };
 
+static const Option rest_surface_options[] = {
+    {'o', "output", "FILE", OPTION_TEXT, AT(output), .help = "Write the surface (default: measure it only)"},
+    {0, "threads", "N", OPTION_INTEGER, AT(threads), .min = 1, .max = 1024,
+     .help = "Threads (default: one for each core). The result does not depend on it"},
+    OPTION_ROW_JSON,
+    OPTION_ROW_HELP,
+};
+
 static const Option rest_cut_options[] = {
     {'o', "output", "FILE", OPTION_TEXT, AT(output), .help = "Write the block; required"},
     {0, "min", "X,Y,Z", OPTION_VECTOR, AT(min),
@@ -313,6 +321,12 @@ static const Command commands[] = {
      "  skiff rest make\n"
      "  skiff rest make --edge 16 --seed 7 -o tile.skiff\n",
      rest_make_options, COUNT(rest_make_options), rest_make_command},
+    {"rest surface", NULL, false, "[-o FILE]", "Make the surface of the sea: the built-in tile, settled",
+     "Cuts the tile that is part of the program at a level and lets what is left settle there, repeating\n"
+     "without end to all sides. The sea ahead of a window is made of it and of the tile below. The surface\n"
+     "itself is part of the program, too; it has to be made anew when the tile is.\n",
+     "  skiff rest surface -o assets/rest/surface.skiff\n",
+     rest_surface_options, COUNT(rest_surface_options), rest_surface_command},
     {"rest cut", "folder", true, "DIR -o FILE", "Cut a block of water at rest out of a finished run",
      "Takes the particles of a box out of the last state of a run, a tank that has settled, and prints how "
      "much\n"

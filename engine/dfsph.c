@@ -87,7 +87,7 @@ static void total_partials(const Dfsph *dfsph, uint32_t blocks, int count, doubl
     _Pragma("omp parallel for schedule(static) num_threads(problem->threads)") for (uint32_t block = 0;      \
                                                                                     block < blocks; block++)
 #define EACH_SLICE for (uint32_t first = block * BLOCK; first < (block + 1) * BLOCK; first += SLICE)
-#define EACH_LANE  for (uint32_t l = 0; l < LANES; l++)
+#define EACH_LANE  _Pragma("omp simd") for (uint32_t l = 0; l < LANES; l++)
 
 /* ---- The operator ---- */
 

@@ -47,45 +47,37 @@ static inline float near_distance_sq(const Kernel *kernel) {
 
 /* ---- Neighbour search ---- */
 
-typedef struct Candidates {
-    int count;
-    int self_shift; /* place of particle i of the centre column's run is i + self_shift */
-} Candidates;
-
-/* The cell whose surroundings lie in scratch. */
+/* The cell whose candidates lie in scratch. */
 typedef struct SearchCell {
     uint32_t index;
-    Candidates candidates;
+    int candidate_count;
 } SearchCell;
 
-/* Copies the particles of the 27 cells around `cell` into scratch, run by run. */
-static bool gather_candidates(const SearchJob *job, uint32_t cell, Scratch *scratch, Candidates *candidates) {
+/* Copies the particles of the 27 cells around `cell` into scratch, run by run, and fills the last lanes with
+ * points that are near nothing. Returns how many there are, -1 for too many. */
+static int gather_candidates(const SearchJob *job, uint32_t cell, Scratch *scratch) {
     const CellGrid *grid = job->grid;
     const int32_t column = grid->size[1], slab = grid->size[1] * grid->size[2];
     int n = 0;
-    for (int dx = -1; dx <= 1; dx++) {
-        for (int dz = -1; dz <= 1; dz++) {
-            const int64_t middle = (int64_t)cell + dx * slab + dz * column;
-            const uint32_t begin = grid->start[middle - 1], end = grid->start[middle + 2];
-            if (n + (int64_t)(end - begin) > MAX_CANDIDATES)
-                return false;
-            if (dx == 0 && dz == 0)
-                candidates->self_shift = n - (int)begin;
-            for (uint32_t j = begin; j < end; j += LANES) {
-                Vf x, y, z, unused;
-                vf_load4(job->position + j, &x, &y, &z, &unused);
-                const int to = n + (int)(j - begin);
-                vf_store(scratch->x + to, x);
-                vf_store(scratch->y + to, y);
-                vf_store(scratch->z + to, z);
-                const Vi index = vi_add(vi_set((int32_t)j), vi_lane());
-                vi_store(scratch->halves + to, vi_add(index, index));
-            }
-            n += (int)(end - begin);
+    for (int run = 0; run < 9; run++) {
+        const int64_t middle = (int64_t)cell + (run / 3 - 1) * slab + (run % 3 - 1) * column;
+        const uint32_t begin = grid->start[middle - 1], end = grid->start[middle + 2];
+        if (n + (int64_t)(end - begin) > MAX_CANDIDATES)
+            return -1;
+        for (uint32_t j = begin; j < end; j += LANES) {
+            Vf x, y, z, unused;
+            vf_load4(job->position + j, &x, &y, &z, &unused);
+            const int to = n + (int)(j - begin);
+            vf_store(scratch->x + to, x);
+            vf_store(scratch->y + to, y);
+            vf_store(scratch->z + to, z);
+            const Vi index = vi_add(vi_set((int32_t)j), vi_lane());
+            vi_store(scratch->halves + to, vi_add(index, index));
         }
+        n += (int)(end - begin);
     }
-    candidates->count = n;
-    return true;
+    vf_store(scratch->x + n, vf_set(1e18f));
+    return n;
 }
 
 typedef struct NeighbourCount {
@@ -94,26 +86,24 @@ typedef struct NeighbourCount {
 
 /* Neighbours of particle i in the order of the candidates, the near ones first; all is -1 when there are too
  * many. */
-static NeighbourCount find_neighbours(const SearchJob *job, const Candidates *candidates, uint32_t i,
-                                      Scratch *scratch, int32_t *list) {
+static NeighbourCount find_neighbours(const SearchJob *job, int candidate_count, uint32_t i, Scratch *scratch,
+                                      int32_t *list) {
     const Vf x = vf_set(job->position[i][0]), y = vf_set(job->position[i][1]),
              z = vf_set(job->position[i][2]);
     const Vf limit = vf_set(job->kernel.support * job->kernel.support);
     const Vf near_limit = vf_set(near_distance_sq(&job->kernel));
-    const int self = (int)i + candidates->self_shift;
+    const Vi self = vi_set((int32_t)(2 * i));
     int near = 0, far = 0;
-    for (int c = 0; c < candidates->count; c += LANES) {
+    for (int c = 0; c < candidate_count; c += LANES) {
         const Vf dx = vf_sub(x, vf_load(scratch->x + c));
         const Vf dy = vf_sub(y, vf_load(scratch->y + c));
         const Vf dz = vf_sub(z, vf_load(scratch->z + c));
         const Vf distance_sq = vf_fma(dx, dx, vf_fma(dy, dy, vf_mul(dz, dz)));
-        uint32_t valid = candidates->count - c >= LANES ? 0xffffu : (1u << (candidates->count - c)) - 1u;
-        if ((unsigned)(self - c) < LANES)
-            valid &= ~(1u << (self - c));
         const Vm is_near = vf_less(distance_sq, near_limit);
         const Vm is_far = vf_less(distance_sq, limit) & (Vm)~is_near;
-        near += vi_compress(list + near, scratch->halves + c, (Vm)(is_near & valid));
-        far += vi_compress(scratch->far + far, scratch->halves + c, (Vm)(is_far & valid));
+        const Vm is_self = vi_equal(vi_load(scratch->halves + c), self);
+        near += vi_compress(list + near, scratch->halves + c, is_near & (Vm)~is_self);
+        far += vi_compress(scratch->far + far, scratch->halves + c, is_far);
         if (near + far > MAX_NEIGHBOURS)
             return (NeighbourCount){-1, 0};
     }
@@ -205,13 +195,12 @@ static NeighbourCount list_neighbours(const SearchJob *job, uint32_t first, Sear
         if (job->frozen != NULL && job->frozen[i])
             continue;
         NeighbourCount found = {-1, 0};
-        bool fits = true;
         if (job->cell[i] != cell->index) {
             cell->index = job->cell[i];
-            fits = gather_candidates(job, cell->index, scratch, &cell->candidates);
+            cell->candidate_count = gather_candidates(job, cell->index, scratch);
         }
-        if (fits)
-            found = find_neighbours(job, &cell->candidates, i, scratch, scratch->list[l]);
+        if (cell->candidate_count >= 0)
+            found = find_neighbours(job, cell->candidate_count, i, scratch, scratch->list[l]);
         if (found.all < 0) {
             *fault = i;
             return found;

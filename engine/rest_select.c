@@ -280,10 +280,20 @@ static void mark_rim(Select *select) {
     }
 }
 
+/* All points that may feel a solid settle with those that do: between one and two support radii from it. */
+static void widen(Select *select) {
+    EACH_POINT {
+        if (select->state[i] == PASSIVE && kind_of(select, i) == REST_FLUID)
+            select->state[i] = CANDIDATE;
+    }
+}
+
 /* Air and what was removed goes; what stays is told apart by how it takes part in the stabilisation. */
 static void keep_selected(Select *select, SkiffFill *fill) {
     Particles *points = &select->cloud->points;
     uint32_t kept = 0, *order = select->cloud->order.data;
+    if (select->params->rest_settle == REST_SETTLE_SHELL)
+        widen(select);
     mark_rim(select);
     fill->active = 0;
     for (uint32_t i = 0; i < select->count; i++) {

@@ -144,6 +144,8 @@ static bool make_tank(SkiffSim *sim, const SkiffDef *def, Err *err) {
         return false;
     const Mesh *mesh = &sim->tank.mesh;
     sim->tank_open = tank->open;
+    if (sea_has_water_edge(def))
+        return true;
     /* the lid of an open tank lies on the bounds: cutting just below leaves it out */
     SampleRegion region = {{-INFINITY, -INFINITY, -INFINITY}, {INFINITY, INFINITY, INFINITY}};
     const float spacing = def->params.boundary_spacing * def->params.particle_radius;
@@ -345,6 +347,8 @@ static uint64_t hash_def(const SkiffSim *sim, const SkiffDef *def) {
         XXH3_64bits_update(&state, &sim->drives[d].body, sizeof(int));
         XXH3_64bits_update(&state, &sim->drives[d].def, sizeof(SkiffDriveDef));
     }
+    XXH3_64bits_update(&state, sim->tank.min, sizeof sim->tank.min);
+    XXH3_64bits_update(&state, sim->tank.max, sizeof sim->tank.max);
     XXH3_64bits_update(&state, &sim->domain, sizeof sim->domain);
     XXH3_64bits_update(&state, &sim->sea.level, sizeof sim->sea.level);
     XXH3_64bits_update(&state, &sim->sea.follow, sizeof sim->sea.follow);

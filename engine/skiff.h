@@ -187,6 +187,7 @@ typedef struct SkiffSeaDef {
     bool has_region; /* absorption only where [min, max] is, m */
     float region_min[3], region_max[3];
     const char *cache; /* folder for water that was made before, or NULL */
+    bool dry;          /* no water, which takes long to make: for who only looks at shapes */
 } SkiffSeaDef;
 
 typedef enum SkiffSimd { SKIFF_SIMD_AUTO, SKIFF_SIMD_PLAIN, SKIFF_SIMD_AVX2, SKIFF_SIMD_AVX512 } SkiffSimd;
@@ -488,6 +489,9 @@ SkiffTile *skiff_tile_make(const SkiffTileDef *def, Err *err);
 /* The particles inside [min, max] (m, world) as a block. NULL with ERR_INPUT: none is, or the box is too
  * small for a particle with all its neighbours. */
 SkiffTile *skiff_tile_cut(const SkiffSim *sim, const double min[3], const double max[3], Err *err);
+/* The built-in tile settled under a free surface, as a block whose sides repeat: what a sea is made of. Takes a
+ * minute. */
+SkiffTile *skiff_tile_surface(int threads, Err *err);
 /* Reads a file; path NULL: the tile that comes with the program. NULL with ERR_INPUT or ERR_IO. */
 SkiffTile *skiff_tile_open(const char *path, Err *err);
 bool skiff_tile_save(const SkiffTile *tile, const char *path, Err *err);

@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { STATE_VERSION = 3, BODY_SCALARS = 3 + 4 + 3 + 3 };
+enum { STATE_VERSION = 4, BODY_SCALARS = 3 + 4 + 3 + 3 };
 
 static void body_to_scalars(const Body *body, double *out) {
     memcpy(out, body->position, 3 * sizeof(double));
@@ -134,5 +134,6 @@ bool skiff_load(SkiffSim *sim, const char *path, Err *err) {
                               .particles = sim->particles.count,
                               .boundary_samples = sim->stats.boundary_samples};
     return boundary_place(&sim->boundary, sim->bodies, sim->body_count, sim->origin, sim->kernel.support,
-                          sim->threads, err);
+                          sim->threads, err) &&
+           (!sim->sea.water_edge || absorb_make(sim, err));
 }

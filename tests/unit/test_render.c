@@ -63,13 +63,24 @@ static void only_upper_layers_of_an_ocean_are_drawn(void **state) {
     (void)state;
     Surface surface = {0};
     GfxScene scene = make_block();
+    static const float inside[4] = {9.0f, 9.0f, 9.0f, 9.0f};
     scene.ocean.enabled = true;
+    scene.ocean.edge_distance = inside;
+    for (int k = 0; k < 2; k++) {
+        scene.ocean.edge_min[k] = -5.0f;
+        scene.ocean.edge_max[k] = 5.0f;
+    }
     select_or_fail(&surface, &scene, GFX_LOOK_WATER);
     /* The whole top layer, and nothing more than two cells down. */
     assert_in_range(surface.body.count, EDGE * EDGE, 4 * EDGE * EDGE);
     assert_true(lowest_inside(&surface.body) > -4.5f * SPACING);
     assert_int_equal(surface.droplets.count, 0);
     assert_int_equal(surface.fading.count, 0);
+    /* Nothing where the ocean is drawn instead. */
+    static const float beyond[4] = {-20.0f, -20.0f, -20.0f, -20.0f};
+    scene.ocean.edge_distance = beyond;
+    select_or_fail(&surface, &scene, GFX_LOOK_WATER);
+    assert_int_equal(surface.body.count, 0);
     surface_free(&surface);
 }
 
