@@ -116,7 +116,7 @@ vec3 shade(Water water, vec3 direction, float ray_length, vec3 background, vec3 
     float footprint = far * 2.0 * lens.y * size.w * inversesqrt(max(abs(direction.y), 0.03));
     float level = ripple_level(footprint);
     vec2 slopes = ripple_slopes(water.place.xz, level) * smoothstep(0.2, 0.75, n.y);
-    n = normalize(n - vec3(slopes.x, 0.0, slopes.y) * (1.0 - 0.3 * water.fluid));
+    n = normalize(n - vec3(slopes.x, 0.0, slopes.y));
     float facing = dot(n, direction);
     if (facing > -0.03) { // turned away: as steep as can be seen
         n = normalize(n - direction * (facing + 0.04));
@@ -133,7 +133,7 @@ vec3 shade(Water water, vec3 direction, float ray_length, vec3 background, vec3 
     float broad = power_of_64(towards_sun), narrow = broad * broad;
     narrow *= narrow; // 256
     narrow *= narrow * narrow * narrow; // 1024
-    float glint = 1.8 * narrow + 0.20 * broad;
+    float glint = 1.3 * narrow + 0.20 * broad;
     vec2 bend = (mat3(view) * (n - vec3(0.0, max(n.y, 0.0), 0.0))).xy;
     vec4 mesh_mirrored = vec4(0.0);
     if (HAS_MESHES)
