@@ -123,7 +123,9 @@ vec3 shade(Water water, vec3 direction, float ray_length, vec3 background, vec3 
         facing = dot(n, direction);
     }
     float grazing = 1.0 + facing, grazing_sq = grazing * grazing;
-    float mirror = min(0.02 + 0.98 * grazing_sq * grazing_sq * grazing, 0.82);
+    // Steep faces are rough: they mirror little.
+    float most = mix(0.35, 0.82, smoothstep(0.5, 0.9, n.y));
+    float mirror = min(0.02 + 0.98 * grazing_sq * grazing_sq * grazing, most);
     vec3 up = reflect(direction, n);
     // Ripples too small to see still tilt what is seen: far water mirrors a higher sky.
     up.y = abs(up.y) + 0.02 + 0.16 * ground.w * smoothstep(0.02, 0.6, footprint);
