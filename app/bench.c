@@ -278,22 +278,38 @@ static char *csv_line(const json_t *result, bool is_header) {
     return fclose(stream) == 0 ? line : NULL;
 }
 
-static bool has_header(const char *path, const char *header, Err *err) {
+/* *same: the file is absent or begins with this header. */
+static bool takes_header(const char *path, const char *header, bool *same, Err *err) {
     char *old;
     size_t size;
+    *same = !file_exists(path);
+    if (*same)
+        return true;
     if (!file_read(path, (size_t)64 << 20, &old, &size, err))
         return false;
-    bool same = strncmp(old, header, strlen(header)) == 0;
+    *same = strncmp(old, header, strlen(header)) == 0;
     free(old);
-    return same ||
-           err_set(err, ERR_INPUT,
-                   "%s: has other columns than these results; move it away or use --no-results", path);
+    return true;
+}
+
+/* The first of SCENE.csv, SCENE-2.csv, ... with these columns: rows of a version that measured other phases
+ * stay as they are. */
+static bool find_results_file(const char *folder, const char *scene, const char *header, char *path,
+                              size_t path_size, Err *err) {
+    bool same = false;
+    for (int n = 1; !same; n++) {
+        if (n == 1)
+            snprintf(path, path_size, "%s/%s.csv", folder, scene);
+        else
+            snprintf(path, path_size, "%s/%s-%d.csv", folder, scene, n);
+        if (!takes_header(path, header, &same, err))
+            return false;
+    }
+    return true;
 }
 
 static bool append_row(const char *path, const char *header, const char *row, Err *err) {
     bool exists = file_exists(path);
-    if (exists && !has_header(path, header, err))
-        return false;
     FILE *stream = fopen(path, "ab");
     if (!stream)
         return err_set(err, ERR_IO, "%s: cannot be written: %s", path, strerror(errno));
@@ -313,10 +329,11 @@ static bool keep_result(const CliArgs *args, const json_t *result, Err *err) {
         return true;
     if (!file_make_directory(folder, err))
         return false;
-    snprintf(path, sizeof path, "%s/%s.csv", folder, text(result, "scene"));
     char *header = csv_line(result, true), *row = csv_line(result, false);
-    bool kept =
-        header && row ? append_row(path, header, row, err) : err_set(err, ERR_IO, "%s: out of memory", path);
+    bool kept = header && row
+                    ? find_results_file(folder, text(result, "scene"), header, path, sizeof path, err) &&
+                          append_row(path, header, row, err)
+                    : err_set(err, ERR_IO, "%s: out of memory", folder);
     free(header);
     free(row);
     return kept;

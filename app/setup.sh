@@ -39,7 +39,10 @@ setup_packages() {
         libegl1 libegl-mesa0 libgl1-mesa-dri libosmesa6 libstb-dev fonts-dejavu-core
     case $1 in
     demo) setup_command ffmpeg ffmpeg ;;
-    test | ci) setup_package libcmocka-dev ;;
+    test | ci)
+        setup_package libcmocka-dev
+        setup_command ffmpeg ffmpeg
+        ;;
     esac
     case $1 in
     ci)

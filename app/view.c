@@ -570,11 +570,11 @@ static bool make_picture(View *view, const SkiffSim *sim, Err *err) {
     def.supersample = render->supersample;
     def.look = looks[render->look];
     def.backend = backends[view->options.backend];
-    if (view->options.video && !gfx_video_check(err))
-        return false;
     if (view->options.video && (def.width % 2 != 0 || def.height % 2 != 0))
         return err_set(err, ERR_USAGE, "--video: width and height must be even, found %dx%d", def.width,
                        def.height);
+    if (view->options.video && !gfx_video_check(err))
+        return false;
     view->gfx = gfx_create(&def, err);
     if (!view->gfx)
         return false;

@@ -14,6 +14,7 @@ typedef struct SolveResult {
 } SolveResult;
 
 typedef struct Dfsph {
+    Float4 *operand;      /* positions, and what D^T is applied to in the fourth place */
     Float4 *acceleration; /* D^T p */
     Float4 *guess;        /* velocity after the pressure so far */
     Float4 *spare[2];     /* for others between the solves, as are the two above */

@@ -28,6 +28,11 @@ void grid_free(Grid *grid);
  * would have more than GRID_MAX_CELLS. */
 bool grid_layout(CellGrid *cells, const GridBounds *bounds, float cell_size, int margin);
 
+/* m */
+static inline float grid_centre(const CellGrid *cells, int axis) {
+    return cells->origin[axis] + 0.5f * (float)cells->size[axis] / cells->inv_size;
+}
+
 static inline uint32_t grid_cell_of(const CellGrid *cells, const float *p) {
     int32_t c[3];
     for (int k = 0; k < 3; k++)

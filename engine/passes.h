@@ -22,19 +22,20 @@ enum {
     MAX_CONTACT_OBJECTS = 8 /* walls and bodies that may touch one particle */
 };
 
-/* One k-th neighbour for each of a slice's sixteen particles, two cache lines: the neighbour as offset from
- * the slice's first particle, and V grad W in units of its largest possible magnitude / 32767. Fixed point is
- * ten times as accurate as half precision where it matters, exactly antisymmetric, and needs no special
- * instruction. Unused places point at the particle itself with gradient 0. */
+/* One k-th neighbour for each of a slice's sixteen particles, one cache line: the neighbour as offset from
+ * the slice's first particle, and -V (dW/dr) / r in units of its largest value / 65535. Times x_i - x_j,
+ * which the passes gather along with what they sum up, that is -V grad W: exactly antisymmetric, and a
+ * quarter of the traffic of three single-precision components. The rows are streamed from memory in every
+ * pass, and that is what a pass costs. Unused places point at the particle itself with factor 0. */
 typedef struct RowEntry {
-    int16_t index[SLICE];
-    int16_t gradient[3][SLICE];
+    int16_t place[SLICE];
+    uint16_t factor[SLICE];
 } RowEntry;
 
 /* The same with room for any offset, for flows so wide that an offset may leave 16 bits. */
 typedef struct RowEntryWide {
-    int32_t index[SLICE];
-    int16_t gradient[3][SLICE];
+    int32_t place[SLICE];
+    uint16_t factor[SLICE];
 } RowEntryWide;
 
 /* Cells of edge h over the particles' bounds with one empty layer around; y fastest, then z, then x: the
@@ -78,26 +79,45 @@ typedef struct SampleSet {
 /* Scratch of one thread; too large for the stack. */
 typedef struct Scratch {
     float x[MAX_CANDIDATES + LANES], y[MAX_CANDIDATES + LANES], z[MAX_CANDIDATES + LANES];
-    int32_t index[MAX_CANDIDATES + LANES];
+    int32_t halves[MAX_CANDIDATES + LANES]; /* places of the candidates as vf_gather4_i32 takes them */
     int32_t list[SLICE][MAX_NEIGHBOURS + LANES];
+    int32_t far[MAX_NEIGHBOURS + LANES];
     Contact contacts[BLOCK * MAX_CONTACT_OBJECTS];
 } Scratch;
+
+/* Entries of a slice. Neighbours nearer than NEAR_SUPPORT come first: of every particle they are among the
+ * first `near` entries, which may hold others as well. */
+typedef struct SliceRows {
+    uint32_t start;
+    uint16_t length, near;
+} SliceRows;
+
+/* In supports: the first shell of water at rest, 12 of 36 neighbours, and seven eighths of the sum of W_ij.
+ */
+#define NEAR_SUPPORT 0.68f
 
 /* What every pair pass reads. Arrays are padded to whole blocks. */
 typedef struct PairData {
     uint32_t count;
     Kernel kernel;
-    float volume;        /* V, m^3 */
-    float gradient_unit; /* value of 1 in RowEntry.gradient, 1/m */
+    float volume;      /* V, m^3 */
+    float factor_unit; /* value of 1 in RowEntry.factor, 1/m^2 */
+    float centre[3];   /* m; middle of the particles: moments x . v are taken about it */
     bool wide;
-    const uint8_t *entries;      /* RowEntry or RowEntryWide */
-    const int16_t *weights;      /* [entries][SLICE] W_ij in units of W(0) / 32767; 0 in unused places */
-    const uint32_t *slice_start; /* first entry of a slice */
-    const uint16_t *slice_length;
+    const uint8_t *entries; /* RowEntry or RowEntryWide */
+    const int16_t *weights; /* [entries][SLICE] W_ij in units of W(0) / 32767; 0 in unused places */
+    const SliceRows *slices;
     const Float4 *position;
     const float *density;       /* rho / rho0 */
     const Float4 *gradient_sum; /* G_i = sum_j V grad W_ij + g_i; [3]: diagonal of D D^T */
 } PairData;
+
+/* The particle in lane `lane` of an entry of the slice that begins at `first`. */
+static inline uint32_t entry_neighbour(const PairData *pairs, uint32_t first, uint32_t entry, uint32_t lane) {
+    const int32_t place = pairs->wide ? ((const RowEntryWide *)pairs->entries)[entry].place[lane]
+                                      : ((const RowEntry *)pairs->entries)[entry].place[lane];
+    return (uint32_t)((int32_t)first + place / 2);
+}
 
 typedef enum SearchStatus {
     SEARCH_OK = 0,
@@ -118,14 +138,14 @@ typedef struct SearchJob {
     uint32_t count;
     Kernel kernel;
     float volume;
+    float factor_unit; /* as in PairData */
     bool wide;
     uint8_t *entries;
     int16_t *weights;
     const uint8_t *frozen; /* NULL, or [particles] 1: gets no row, and density and gradient sum of none */
-    uint32_t *slice_start;
-    uint16_t *slice_length;
+    SliceRows *slices;
     float *density;
-    Float4 *gradient_sum; /* in units of gradient_unit; [3]: sum of squares */
+    Float4 *gradient_sum; /* sum_j V grad W_ij, 1/m; [3]: sum of their squares */
     uint16_t *neighbours;
     RowAllocate *allocate;
     void *rows;
@@ -138,17 +158,27 @@ typedef struct BoundaryJob {
     const uint8_t *frozen; /* NULL, or [particles] 1: left out */
     uint32_t count;
     Kernel kernel;
-    float gradient_unit;
     float *density;       /* NULL: list the contacts only */
-    Float4 *gradient_sum; /* in: as the search left it; out: in 1/m, with the boundary, [3] the diagonal */
+    Float4 *gradient_sum; /* in: as the search left it; out: with the boundary, [3] the diagonal */
     uint16_t *neighbours;
 } BoundaryJob;
 
+/* Vectors that `divergence` takes carry their moment about PairData.centre in the fourth place: with it a
+ * pair needs one gather, sum_j f (x_i - x_j) . v_j = x_i . sum_j f v_j - sum_j f x_j . v_j. The difference
+ * costs the digits of (distance from the centre) / (distance of neighbours): at 100 supports the error is a
+ * tenth of what rounding the factors makes. */
+static inline float vector_moment(const PairData *pairs, const float *position, const float *v) {
+    float moment = 0.0f;
+    for (int k = 0; k < 3; k++)
+        moment += (position[k] - pairs->centre[k]) * v[k];
+    return moment;
+}
+
 typedef struct AccelerateJob {
-    const float *p;
+    const Float4 *operand; /* position and p of every particle */
     const Float4 *base;
     float scale;
-    Float4 *result;
+    Float4 *result; /* with moments */
 } AccelerateJob;
 
 typedef struct ForceJob {
@@ -177,10 +207,10 @@ typedef struct Passes {
      * *fault. */
     int (*boundary)(const BoundaryJob *job, uint32_t block, Scratch *scratch, uint32_t *fault);
     /* result_i = base_i + scale (D^T p)_i, (D^T p)_i = p_i G_i + sum_j p_j V grad W_ij. base NULL: 0; base
-     * may be result. */
+     * may be result. Its fourth place is not read. */
     void (*accelerate)(const PairData *pairs, const AccelerateJob *job, uint32_t block);
-    /* result_i = (D v)_i = v_i . G_i - sum_j v_j . V grad W_ij; contacts with moving bodies are the caller's
-     */
+    /* result_i = (D v)_i = v_i . G_i - sum_j v_j . V grad W_ij, v with moments; contacts with moving bodies
+     * are the caller's */
     void (*divergence)(const PairData *pairs, const Float4 *v, float *result, uint32_t block);
     /* velocity gradients by weighted least squares over the neighbours */
     void (*strain)(const StrainJob *job, uint32_t block);

@@ -35,15 +35,13 @@ typedef struct Select {
 
 int rest_row(const PairData *pairs, uint32_t i, RestNeighbour *row) {
     const uint32_t slice = i / SLICE, lane = i % SLICE, first = slice * SLICE;
-    const uint32_t begin = pairs->slice_start[slice];
+    const uint32_t begin = pairs->slices[slice].start;
     int count = 0;
-    for (uint32_t entry = begin; entry < begin + pairs->slice_length[slice]; entry++) {
+    for (uint32_t entry = begin; entry < begin + pairs->slices[slice].length; entry++) {
         const int32_t weight = pairs->weights[(size_t)entry * SLICE + lane];
         if (weight == 0)
             continue;
-        const int32_t offset = pairs->wide ? ((const RowEntryWide *)pairs->entries)[entry].index[lane]
-                                           : ((const RowEntry *)pairs->entries)[entry].index[lane];
-        row[count++] = (RestNeighbour){(uint32_t)((int32_t)first + offset), weight};
+        row[count++] = (RestNeighbour){entry_neighbour(pairs, first, entry, lane), weight};
     }
     return count;
 }
@@ -282,10 +280,20 @@ static void mark_rim(Select *select) {
     }
 }
 
+/* All points that may feel a solid settle with those that do: between one and two support radii from it. */
+static void widen(Select *select) {
+    EACH_POINT {
+        if (select->state[i] == PASSIVE && kind_of(select, i) == REST_FLUID)
+            select->state[i] = CANDIDATE;
+    }
+}
+
 /* Air and what was removed goes; what stays is told apart by how it takes part in the stabilisation. */
 static void keep_selected(Select *select, SkiffFill *fill) {
     Particles *points = &select->cloud->points;
     uint32_t kept = 0, *order = select->cloud->order.data;
+    if (select->params->rest_settle == REST_SETTLE_SHELL)
+        widen(select);
     mark_rim(select);
     fill->active = 0;
     for (uint32_t i = 0; i < select->count; i++) {

@@ -1,7 +1,8 @@
 /* Last stage of a fill: what was selected settles [Carensac2023 sec. 3.3]. And the fill as a whole.
  *
- * A step: search, (divergence solve,) gravity, viscosity and calming without limit, density solve, damping,
- * motion: the solver's own. Bodies are held. Errors are means over the active particles.
+ * A step: search, (divergence solve,) gravity and viscosity, density solve, damping, motion: the solver's
+ * own, but not calming: what settles is all disorder, and losing it every step means creeping to its place
+ * where it could fall. Bodies are held. Errors are means over the active particles.
  *
  * restSettle candidates, the paper's way: in the cloud, with rows for the candidates and what stands beside
  * them. All other points stand still and keep the pressure that still water has at their place: for the solve
@@ -12,22 +13,27 @@
  * yield ends crowded or starved wherever the selection took one point too few or too many, and so the first
  * free steps move everything; and a cut through water at rest is no free surface at rest. Existing water
  * stands still here too. Beside the new it begins with the pressure of still water and then, where the new
- * water crowds it, presses harder until it is not. */
+ * water crowds it, presses harder until it is not.
+ *
+ * restSettle shell: most of the way is that of the layer, all of it is needed only for the last, small one.
+ * First the cloud as with candidates, but twice as thick a layer; then a few steps of everything. */
 #include "sim.h"
 
 #include <math.h>
 
 /* alpha of the printed schedule, from the first to the last step [sec. 5.1] */
 static const double FIRST_ALPHA = 0.8, LAST_ALPHA = 0.1;
-/* Calming without limit: nothing that settles moves as it should. m/s^2 */
-static const float NO_LIMIT = 1e3f;
-
-/* Longest step, r / sqrt(p / rho0): 1.5 is unstable, whatever depth and radius. */
-static const float LONGEST = 1.1f;
+/* Longest step, r / sqrt(p / rho0): beyond 1.5 it is unstable, whatever depth and radius. */
+static const float LONGEST = 1.35f;
 /* Of a density error of held water, the share that a step turns into pressure: with 1 its pressures swing. */
 static const float HELD_SHARE = 0.15f;
 /* Of what two particles lack to the distance of a radius, the share that each moves a step. */
 static const float PART_SHARE = 0.1f;
+
+/* Share of a density error that a step corrects, and of the velocity that it keeps, while a column settles.
+ */
+static const float COLUMN_SOFTENING = 0.25f, COLUMN_RETENTION = 0.8f;
+enum { COLUMN_STEPS = 6000 };
 
 /* What settles, and with what. */
 typedef struct Settle {
@@ -41,7 +47,9 @@ typedef struct Settle {
     const uint8_t *frozen; /* [particles] 1: no row; or NULL */
     const uint8_t *held;   /* [particles] 1: does not move; or NULL */
     uint32_t active;
+    int steps;     /* at most */
     float surface; /* y, m */
+    double period; /* of a column, m */
 } Settle;
 
 /* ---- Search ---- */
@@ -75,6 +83,18 @@ static Settle settle_cloud(SkiffSim *sim) {
                     .dfsph = &cloud->dfsph,
                     .frozen = cloud->frozen.data,
                     .held = cloud->held.data};
+}
+
+static Settle settle_all(SkiffSim *sim, float surface, uint32_t active) {
+    return (Settle){.sim = sim,
+                    .params = sim->params,
+                    .particles = &sim->particles,
+                    .grid = &sim->grid,
+                    .rows = &sim->rows,
+                    .boundary = &sim->boundary,
+                    .dfsph = &sim->dfsph,
+                    .active = active,
+                    .surface = surface};
 }
 
 bool rest_search(SkiffSim *sim, uint32_t evaluated, Err *err) {
@@ -176,10 +196,56 @@ static bool search_cloud(Settle *settle, uint64_t first_id, Err *err) {
 static bool search_all(Settle *settle, uint64_t first_id, Err *err) {
     if (!settle_sort(settle, err))
         return false;
+    const Particles *particles = settle->particles;
     uint8_t *held = settle->sim->rest.held.data;
-    for (uint32_t i = 0; i < settle->particles->count; i++)
-        held[i] = settle->particles->id[i] < first_id;
+    settle->frozen = particles->edge;
+    for (uint32_t i = 0; i < particles->count; i++)
+        held[i] = particles->id[i] < first_id || particles->edge[i] != EDGE_NONE;
     return settle_rows(settle, err);
+}
+
+/* Drops the last step's copies of the column and wraps what has moved out of it. */
+static void wrap_column(Settle *settle, uint32_t *order) {
+    Particles *particles = settle->particles;
+    const float period = (float)settle->period;
+    uint32_t kept = 0;
+    for (uint32_t i = 0; i < particles->count; i++)
+        if (particles->edge[i] != EDGE_CAUGHT)
+            order[kept++] = i;
+    particles_permute(particles, order, kept, settle->sim->threads);
+    for (uint32_t i = 0; i < kept; i++)
+        for (int k = 0; k < 3; k += 2) {
+            float *x = &particles->position[i][k];
+            *x = *x < 0.0f ? *x + period : *x >= period ? *x - period : *x;
+        }
+}
+
+/* Copies what is within a support of a face to beyond the opposite one: held there, with the velocity and
+ * pressure that the original has now. */
+static void copy_column(Settle *settle) {
+    Particles *particles = settle->particles;
+    const float period = (float)settle->period, support = settle->sim->kernel.support;
+    const uint32_t count = particles->count;
+    for (uint32_t i = 0; i < count; i++)
+        for (int turn_x = -1; turn_x <= 1; turn_x++)
+            for (int turn_z = -1; turn_z <= 1; turn_z++) {
+                const float *at = particles->position[i];
+                const float p[3] = {at[0] + (float)turn_x * period, at[1], at[2] + (float)turn_z * period};
+                if ((turn_x == 0 && turn_z == 0) || p[0] < -support || p[0] > period + support ||
+                    p[2] < -support || p[2] > period + support)
+                    continue;
+                const uint32_t to = particles_append(particles, p, particles->velocity[i], 0.0);
+                particles->pressure[to] = particles->pressure[i];
+                particles->pressure_divergence[to] = particles->pressure_divergence[i];
+                particles->edge[to] = EDGE_CAUGHT;
+            }
+}
+
+static bool search_column(Settle *settle, uint64_t first_id, Err *err) {
+    RestCloud *cloud = &settle->sim->rest;
+    wrap_column(settle, cloud->order.data);
+    copy_column(settle);
+    return search_all(settle, first_id, err);
 }
 
 static bool beside_moving(const Settle *settle, uint32_t i) {
@@ -244,8 +310,7 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
     params->softening = params->rest_softening;
     params->feedforward = 0.0f;
     params->time_step *= scale;
-    if (params->calming > 0.0f)
-        params->calming_limit = NO_LIMIT;
+    params->calming = 0.0f;
     const DfsphProblem problem = {.params = params,
                                   .passes = settle->sim->passes,
                                   .rows = settle->rows,
@@ -256,13 +321,13 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
                                   .threads = settle->sim->threads};
     scale_pressures(settle->particles, scale * scale);
     bool calm = false;
-    for (fill->steps = 0; fill->steps < params->rest_steps && !calm; fill->steps++) {
+    for (int step = 0; step < settle->steps && !calm; step++, fill->steps++) {
         if (!search(settle, first_id, err))
             return false;
         if (params->rest_divergence)
             dfsph_solve(settle->dfsph, &problem, SOLVE_DIVERGENCE);
         forces_apply_fluid(&problem, settle->dfsph);
-        if (params->rest_settle == REST_SETTLE_ALL)
+        if (params->rest_settle != REST_SETTLE_CANDIDATES)
             part_pairs(settle);
         if (settle->held != NULL)
             correct_held(settle);
@@ -270,10 +335,9 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
         const SpeedSums speeds = measure_speeds(settle);
         fill->mean_speed = speeds.mean;
         fill->max_speed = speeds.max;
-        calm = fill->steps + 1 >= params->rest_min_steps &&
-               speeds.max < (double)params->rest_max_speed * unit &&
+        calm = step + 1 >= params->rest_min_steps && speeds.max < (double)params->rest_max_speed * unit &&
                speeds.mean < (double)params->rest_mean_speed * unit;
-        move_active(settle, kept_share(params, fill->steps));
+        move_active(settle, kept_share(params, step));
     }
     scale_pressures(settle->particles, 1.0f / (scale * scale));
     return true;
@@ -321,6 +385,7 @@ bool rest_settle(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err
         return true;
     Settle settle = settle_cloud(sim);
     settle.active = fill->active;
+    settle.steps = sim->params.rest_steps;
     settle.surface = request->surface;
     /* whoever the active can feel is rim: the others need not be sorted in every step */
     take_over(sim, 1u << REST_ACTIVE | 1u << REST_RIM | 1u << REST_EXISTING_RIM, request->birth, fill);
@@ -328,25 +393,50 @@ bool rest_settle(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err
            run_steps(&settle, search_cloud, 0, fill, err);
 }
 
-bool rest_settle_all(SkiffSim *sim, float surface, uint64_t first_id, SkiffFill *fill, Err *err) {
-    fill->active = fill->particles;
-    if (fill->active == 0)
+static uint32_t count_edge(const Particles *particles) {
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < particles->count; i++)
+        count += particles->edge[i] != EDGE_NONE;
+    return count;
+}
+
+bool rest_settle_column(SkiffSim *sim, double period, SkiffFill *fill, Err *err) {
+    fill->active = sim->particles.count - count_edge(&sim->particles);
+    /* a period is at least two supports: at most eight copies of a particle */
+    if (!sim_reserve(sim, 9 * sim->particles.count, err) ||
+        !buffer_reserve(&sim->rest.held, "held particles", sim->particles.capacity + SLICE, err) ||
+        !buffer_reserve(&sim->rest.order, "points to keep", sim->particles.capacity * sizeof(uint32_t), err))
+        return false;
+    Settle settle = settle_all(sim, 0.0f, fill->active);
+    settle.held = sim->rest.held.data;
+    settle.period = period;
+    /* the copies lag one step behind: longer steps, or densities corrected at once, make them swing */
+    settle.params.rest_time_scale = 1.0f;
+    settle.params.rest_softening = COLUMN_SOFTENING;
+    settle.params.rest_retention = COLUMN_RETENTION;
+    settle.params.rest_max_speed = 0.0f;
+    settle.steps = COLUMN_STEPS;
+    const bool good = run_steps(&settle, search_column, 0, fill, err);
+    wrap_column(&settle, sim->rest.order.data);
+    return good;
+}
+
+/* All of the simulation's particles with ids from `first_id` on; all others, and the edge, are held. */
+static bool settle_water(SkiffSim *sim, float surface, uint64_t first_id, SkiffFill *fill, Err *err) {
+    const SkiffParams *params = &sim->params;
+    const bool second = fill->steps > 0; /* shell: after the layer */
+    const int steps = second ? params->rest_final_steps : params->rest_steps;
+    fill->active = fill->particles - count_edge(&sim->particles);
+    if (fill->active == 0 || steps == 0)
         return true;
     still_existing(sim);
     if (!buffer_reserve(&sim->rest.held, "held particles", sim->particles.capacity + SLICE, err))
         return false;
     const bool nothing_else = fill->active == sim->particles.count;
     memset(sim->rest.held.data, 0, sim->particles.capacity + SLICE);
-    Settle settle = {.sim = sim,
-                     .params = sim->params,
-                     .particles = &sim->particles,
-                     .grid = &sim->grid,
-                     .rows = &sim->rows,
-                     .boundary = &sim->boundary,
-                     .dfsph = &sim->dfsph,
-                     .held = nothing_else ? NULL : sim->rest.held.data,
-                     .active = fill->active,
-                     .surface = surface};
+    Settle settle = settle_all(sim, surface, fill->active);
+    settle.held = nothing_else ? NULL : sim->rest.held.data;
+    settle.steps = steps;
     const bool good = run_steps(&settle, search_all, first_id, fill, err);
     for (uint32_t i = 0; i < sim->particles.count; i++)
         if (sim->particles.id[i] >= first_id)
@@ -411,7 +501,7 @@ bool rest_fill(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *
     *fill = (SkiffFill){0};
     const uint64_t first_id = sim->particles.next_id;
     const uint32_t count = sim->particles.count;
-    const bool all = sim->params.rest_settle == REST_SETTLE_ALL;
+    const bool all = sim->params.rest_settle != REST_SETTLE_CANDIDATES;
     const double start = timer_ms();
     if ((request->fitted == NULL && !check_tile(sim, err)) || (all && count > 0 && !keep_existing(sim, err)))
         return false;
@@ -419,11 +509,15 @@ bool rest_fill(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *
     const double gathered = timer_ms();
     good = good && rest_select(sim, fill, err);
     const double selected = timer_ms();
-    good = good && (all || rest_settle(sim, request, fill, err));
+    /* a layer between walls and water that both stand still finds no rest */
+    const bool layer = !all || (sim->params.rest_settle == REST_SETTLE_SHELL && count == 0);
+    good = good && (!layer || rest_settle(sim, request, fill, err));
     if (good)
         take_over(sim, 0, request->birth, fill);
+    if (good && request->mark_edge != NULL)
+        request->mark_edge(sim, count);
     const bool fits = request->fitted != NULL && fill->candidates == 0; /* as it is */
-    good = good && (!all || fits || rest_settle_all(sim, request->surface, first_id, fill, err));
+    good = good && (!all || fits || settle_water(sim, request->surface, first_id, fill, err));
     if (good)
         show(sim, first_id, all && !fits);
     else

@@ -14,7 +14,7 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
-enum { FITTED_VERSION = 1, PATH_SIZE = 4096 };
+enum { FITTED_VERSION = 2, PATH_SIZE = 4096 };
 
 /* ---- Storage ---- */
 
@@ -203,6 +203,7 @@ static bool take_def(SkiffSim *sim, const SkiffDef *def, Err *err) {
     sea->on = true;
     sea->level = (double)def->sea.level;
     sea->absorbs = def->sea.absorb;
+    sea->water_edge = sea_has_water_edge(def);
     sea->has_region = def->sea.has_region;
     for (int k = 0; k < 3; k++) {
         sea->centre[k] = 0.5 * ((double)sim->tank.min[k] + (double)sim->tank.max[k]);
@@ -217,6 +218,32 @@ static bool take_def(SkiffSim *sim, const SkiffDef *def, Err *err) {
         return err_add(err, ERR_INPUT, "no memory");
     memcpy(sea->path, def->sea.path, (size_t)sea->path_count * sizeof *sea->path);
     return true;
+}
+
+bool sea_has_water_edge(const SkiffDef *def) {
+    return def->sea.on && def->params.window_edge == WINDOW_EDGE_WATER &&
+           (def->sea.follow != NULL || def->sea.path_count > 0);
+}
+
+/* The initial water of a window whose edge is water. */
+static bool fill_edged(SkiffSim *sim, Err *err) {
+    const float depth = (float)(sim->sea.level - sim->origin[1]) - sim->tank.min[1] + sim->kernel.support;
+    if (!water_make(&sim->sea.water, sim, depth, err) || !edge_gather_all(sim, err)) {
+        err_prefix(err, "Sea");
+        return false;
+    }
+    const uint32_t count = sim->sea.laid.water.count;
+    const SeaPlace place = {(float)(sim->sea.level - sim->origin[1])};
+    RestRequest request = sea_request(sim, &place);
+    request.place = anywhere;
+    request.fitted = &sim->sea.laid.water;
+    request.mark_edge = edge_mark;
+    for (int k = 0; k < 3; k++) {
+        request.bounds.min[k] = sim->tank.min[k] - sim->kernel.support;
+        request.bounds.max[k] = sim->tank.max[k] + sim->kernel.support;
+    }
+    return sim_reserve(sim, count + count / 10, err) && rest_fill(sim, &request, &sim->fill, err) &&
+           absorb_make(sim, err);
 }
 
 /* The initial water: the fitted one, less what bodies take up. */
@@ -236,6 +263,8 @@ bool sea_make(SkiffSim *sim, const SkiffDef *def, Err *err) {
         return false;
     if (def->sea.dry)
         return true;
+    if (sim->sea.water_edge)
+        return fill_edged(sim, err);
     char path[PATH_SIZE] = "";
     if (def->sea.cache != NULL)
         snprintf(path, sizeof path, "%.4000s/sea-%016llx.skiff", def->sea.cache,
@@ -261,6 +290,10 @@ void sea_free(Sea *sea) {
     buffer_free(&sea->inlet_buffer);
     buffer_free(&sea->distance_buffer);
     buffer_free(&sea->flow_buffer);
+    buffer_free(&sea->rim_start);
+    buffer_free(&sea->rim_index);
+    water_free(&sea->water);
+    water_list_free(&sea->laid);
     *sea = (Sea){0};
 }
 

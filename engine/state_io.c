@@ -136,5 +136,6 @@ bool skiff_load(SkiffSim *sim, const char *path, Err *err) {
                               .particles = sim->particles.count,
                               .boundary_samples = sim->stats.boundary_samples};
     return boundary_place(&sim->boundary, sim->bodies, sim->body_count, sim->origin, sim->kernel.support,
-                          sim->threads, err);
+                          sim->threads, err) &&
+           (!sim->sea.water_edge || absorb_make(sim, err));
 }

@@ -154,6 +154,11 @@ bool window_follow(SkiffSim *sim, Err *err) {
     WindowPlace place = {.sim = sim, .walls = &sim->tank};
     if (!next_shift(sim, place.shift))
         return true;
+    if (sim->sea.water_edge) {
+        sim->sea.moves++;
+        sim->stats.moved = true;
+        return edge_move(sim, place.shift, err);
+    }
     const float support = sim->kernel.support;
     place.old_margin = sim->params.window_old * sim->params.particle_radius;
     place.new_margin = sim->params.window_new * support;

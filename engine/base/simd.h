@@ -8,6 +8,7 @@
 #define SKIFF_BASE_SIMD_H
 
 #include <math.h>
+#include <stddef.h>
 #include <stdint.h>
 #include <string.h>
 
@@ -18,6 +19,10 @@
 enum { LANES = 16 };
 
 typedef float Float4[4];
+
+static inline const float *float4_at(const Float4 *base, int32_t halves) {
+    return (const float *)((const char *)base + 8 * (ptrdiff_t)halves);
+}
 
 #if defined(SIMD_AVX512)
 
@@ -88,15 +93,44 @@ static inline Vi vi_select(Vm m, Vi yes, Vi no) {
 static inline Vf vf_load_i16(const int16_t *p) {
     return _mm512_cvtepi32_ps(vi_load_i16(p));
 }
+static inline Vf vf_load_u16(const uint16_t *p) {
+    return _mm512_cvtepi32_ps(_mm512_cvtepu16_epi32(_mm256_loadu_si256((const __m256i *)p)));
+}
+/* to nearest even */
+static inline Vi vi_round(Vf a) {
+    return _mm512_cvtps_epi32(a);
+}
+static inline Vf vf_from_int(Vi a) {
+    return _mm512_cvtepi32_ps(a);
+}
 /* to nearest even; |a| <= 32767 */
 static inline void vf_store_i16(int16_t *p, Vf a) {
     vi_store_i16(p, _mm512_cvtps_epi32(a));
 }
-static inline Vf vf_gather(const float *base, Vi index) {
-    return _mm512_i32gather_ps(index, base, 4);
-}
-static inline Vi vi_gather(const int32_t *base, Vi index) {
-    return _mm512_i32gather_epi32(index, base, 4);
+/* out[k][l] = rows[l * stride + k]: sixteen rows of sixteen become columns. */
+static inline void vi_transpose16(const int32_t *rows, int stride, int32_t out[LANES][LANES]) {
+    __m512i quad[4][4]; /* [rows 4 i to 4 i + 3][c]: columns c, 4 + c, 8 + c, 12 + c of these */
+    for (int i = 0; i < 4; i++) {
+        const int32_t *row = rows + 4 * i * stride;
+        const __m512i a = _mm512_loadu_si512(row), b = _mm512_loadu_si512(row + stride);
+        const __m512i c = _mm512_loadu_si512(row + 2 * stride), d = _mm512_loadu_si512(row + 3 * stride);
+        const __m512i ab_low = _mm512_unpacklo_epi32(a, b), ab_high = _mm512_unpackhi_epi32(a, b);
+        const __m512i cd_low = _mm512_unpacklo_epi32(c, d), cd_high = _mm512_unpackhi_epi32(c, d);
+        quad[i][0] = _mm512_unpacklo_epi64(ab_low, cd_low);
+        quad[i][1] = _mm512_unpackhi_epi64(ab_low, cd_low);
+        quad[i][2] = _mm512_unpacklo_epi64(ab_high, cd_high);
+        quad[i][3] = _mm512_unpackhi_epi64(ab_high, cd_high);
+    }
+    for (int c = 0; c < 4; c++) {
+        const __m512i a = _mm512_shuffle_i32x4(quad[0][c], quad[1][c], 0x44);
+        const __m512i b = _mm512_shuffle_i32x4(quad[0][c], quad[1][c], 0xEE);
+        const __m512i e = _mm512_shuffle_i32x4(quad[2][c], quad[3][c], 0x44);
+        const __m512i f = _mm512_shuffle_i32x4(quad[2][c], quad[3][c], 0xEE);
+        _mm512_storeu_si512(out[c], _mm512_shuffle_i32x4(a, e, 0x88));
+        _mm512_storeu_si512(out[4 + c], _mm512_shuffle_i32x4(a, e, 0xDD));
+        _mm512_storeu_si512(out[8 + c], _mm512_shuffle_i32x4(b, f, 0x88));
+        _mm512_storeu_si512(out[12 + c], _mm512_shuffle_i32x4(b, f, 0xDD));
+    }
 }
 static inline void vf_transpose4(__m512 r[4], Vf *x, Vf *y, Vf *z, Vf *w) {
     __m512 t0 = _mm512_unpacklo_ps(r[0], r[1]), t1 = _mm512_unpackhi_ps(r[0], r[1]);
@@ -106,33 +140,27 @@ static inline void vf_transpose4(__m512 r[4], Vf *x, Vf *y, Vf *z, Vf *w) {
     *z = _mm512_castpd_ps(_mm512_unpacklo_pd(_mm512_castps_pd(t1), _mm512_castps_pd(t3)));
     *w = _mm512_castpd_ps(_mm512_unpackhi_pd(_mm512_castps_pd(t1), _mm512_castps_pd(t3)));
 }
-/* Four floats each of base[index[lane]]. One 128-bit load a lane and a transpose beat four gathers by a
- * third. */
-static inline void vf_gather4(const Float4 *base, Vi index, Vf *x, Vf *y, Vf *z, Vf *w) {
-    int32_t id[LANES] __attribute__((aligned(64)));
-    _mm512_store_si512(id, index);
-
-    __m512 r[4];
-    for (int k = 0; k < 4; k++) {
-        r[k] = _mm512_castps128_ps512(_mm_loadu_ps(base[id[k]]));
-        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(base[id[4 + k]]), 1);
-        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(base[id[8 + k]]), 2);
-        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(base[id[12 + k]]), 3);
-    }
-    vf_transpose4(r, x, y, z, w);
+/* Four floats each of the sixteen Float4 that lie halves[lane] / 2 places from base. One 128-bit load a lane
+ * and a transpose beat four gathers by a third. The offsets are in memory: scalar loads leave the vector
+ * units to the transpose, while taking them out of a register costs as much as the rest. And they count half
+ * a Float4: scaled by eight an offset is part of an address, by sixteen it would need an instruction of its
+ * own. */
+#define GATHER4(base, halves, x, y, z, w)                                                                    \
+    __m512 r[4];                                                                                             \
+    for (int k = 0; k < 4; k++) {                                                                            \
+        r[k] = _mm512_castps128_ps512(_mm_loadu_ps(float4_at(base, halves[k])));                             \
+        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(float4_at(base, halves[4 + k])), 1);                    \
+        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(float4_at(base, halves[8 + k])), 2);                    \
+        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(float4_at(base, halves[12 + k])), 3);                   \
+    }                                                                                                        \
+    vf_transpose4(r, x, y, z, w)
+static inline void vf_gather4_i32(const Float4 *base, const int32_t *halves, Vf *x, Vf *y, Vf *z, Vf *w) {
+    GATHER4(base, halves, x, y, z, w);
 }
-/* The same with offsets in memory. Scalar loads of the offsets leave the vector units to the transpose:
- * taking them out of a register costs as much as the rest. */
-static inline void vf_gather4_i16(const Float4 *base, const int16_t *index, Vf *x, Vf *y, Vf *z, Vf *w) {
-    __m512 r[4];
-    for (int k = 0; k < 4; k++) {
-        r[k] = _mm512_castps128_ps512(_mm_loadu_ps(base[index[k]]));
-        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(base[index[4 + k]]), 1);
-        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(base[index[8 + k]]), 2);
-        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(base[index[12 + k]]), 3);
-    }
-    vf_transpose4(r, x, y, z, w);
+static inline void vf_gather4_i16(const Float4 *base, const int16_t *halves, Vf *x, Vf *y, Vf *z, Vf *w) {
+    GATHER4(base, halves, x, y, z, w);
 }
+#undef GATHER4
 /* Sixteen consecutive Float4 to four registers. */
 static inline void vf_load4(const Float4 *p, Vf *x, Vf *y, Vf *z, Vf *w) {
     __m512 r[4];
@@ -242,9 +270,14 @@ static inline Vi vi_load_i16(const int16_t *p) {
     return (Vi){_mm256_cvtepi16_epi32(_mm_loadu_si128((const __m128i *)p)),
                 _mm256_cvtepi16_epi32(_mm_loadu_si128((const __m128i *)(p + 8)))};
 }
+/* packing saturates: the low 16 bits first */
+static inline __m256i avx2_low_16(Vi v) {
+    const __m256i low = _mm256_set1_epi32(0xffff);
+    const __m256i packed = _mm256_packus_epi32(_mm256_and_si256(v.a, low), _mm256_and_si256(v.b, low));
+    return _mm256_permute4x64_epi64(packed, 0xD8);
+}
 static inline void vi_store_i16(int16_t *p, Vi v) {
-    __m256i packed = _mm256_permute4x64_epi64(_mm256_packs_epi32(v.a, v.b), 0xD8);
-    _mm256_storeu_si256((__m256i *)p, packed);
+    _mm256_storeu_si256((__m256i *)p, avx2_low_16(v));
 }
 static inline Vm vi_mask(__m256i a, __m256i b) {
     return (uint32_t)_mm256_movemask_ps(_mm256_castsi256_ps(a)) |
@@ -264,14 +297,18 @@ static inline Vf vf_load_i16(const int16_t *p) {
     Vi i = vi_load_i16(p);
     return VF(_mm256_cvtepi32_ps(i.a), _mm256_cvtepi32_ps(i.b));
 }
+static inline Vf vf_load_u16(const uint16_t *p) {
+    return VF(_mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(_mm_loadu_si128((const __m128i *)p))),
+              _mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(_mm_loadu_si128((const __m128i *)(p + 8)))));
+}
+static inline Vi vi_round(Vf v) {
+    return (Vi){_mm256_cvtps_epi32(v.a), _mm256_cvtps_epi32(v.b)};
+}
+static inline Vf vf_from_int(Vi v) {
+    return VF(_mm256_cvtepi32_ps(v.a), _mm256_cvtepi32_ps(v.b));
+}
 static inline void vf_store_i16(int16_t *p, Vf v) {
     vi_store_i16(p, (Vi){_mm256_cvtps_epi32(v.a), _mm256_cvtps_epi32(v.b)});
-}
-static inline Vf vf_gather(const float *base, Vi index) {
-    return VF(_mm256_i32gather_ps(base, index.a, 4), _mm256_i32gather_ps(base, index.b, 4));
-}
-static inline Vi vi_gather(const int32_t *base, Vi index) {
-    return (Vi){_mm256_i32gather_epi32(base, index.a, 4), _mm256_i32gather_epi32(base, index.b, 4)};
 }
 /* r[k] holds points k (low half) and 4 + k (high half) */
 static inline void avx2_transpose4(const __m256 r[4], __m256 out[4]) {
@@ -282,46 +319,31 @@ static inline void avx2_transpose4(const __m256 r[4], __m256 out[4]) {
     out[2] = _mm256_shuffle_ps(t1, t3, 0x44);
     out[3] = _mm256_shuffle_ps(t1, t3, 0xEE);
 }
-static inline void avx2_gather4(const Float4 *base, const int32_t *id, __m256 out[4]) {
-    __m256 r[4];
-    for (int k = 0; k < 4; k++)
-        r[k] = _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(base[id[k]])),
-                                    _mm_loadu_ps(base[id[4 + k]]), 1);
-    avx2_transpose4(r, out);
+#define GATHER4(base, halves, x, y, z, w)                                                                    \
+    __m256 out[2][4];                                                                                        \
+    for (int half = 0; half < 2; half++) {                                                                   \
+        __m256 r[4];                                                                                         \
+        for (int k = 0; k < 4; k++)                                                                          \
+            r[k] = _mm256_insertf128_ps(                                                                     \
+                _mm256_castps128_ps256(_mm_loadu_ps(float4_at(base, halves[8 * half + k]))),                 \
+                _mm_loadu_ps(float4_at(base, halves[8 * half + 4 + k])), 1);                                 \
+        avx2_transpose4(r, out[half]);                                                                       \
+    }                                                                                                        \
+    *x = VF(out[0][0], out[1][0]);                                                                           \
+    *y = VF(out[0][1], out[1][1]);                                                                           \
+    *z = VF(out[0][2], out[1][2]);                                                                           \
+    *w = VF(out[0][3], out[1][3])
+static inline void vf_gather4_i32(const Float4 *base, const int32_t *halves, Vf *x, Vf *y, Vf *z, Vf *w) {
+    GATHER4(base, halves, x, y, z, w);
 }
-static inline void vf_gather4(const Float4 *base, Vi index, Vf *x, Vf *y, Vf *z, Vf *w) {
-    int32_t id[LANES];
-    vi_store(id, index);
-    __m256 lo[4], hi[4];
-    avx2_gather4(base, id, lo);
-    avx2_gather4(base, id + 8, hi);
-    *x = VF(lo[0], hi[0]);
-    *y = VF(lo[1], hi[1]);
-    *z = VF(lo[2], hi[2]);
-    *w = VF(lo[3], hi[3]);
-}
-static inline void vf_gather4_i16(const Float4 *base, const int16_t *index, Vf *x, Vf *y, Vf *z, Vf *w) {
-    const int32_t id[LANES] = {index[0],  index[1],  index[2],  index[3], index[4],  index[5],
-                               index[6],  index[7],  index[8],  index[9], index[10], index[11],
-                               index[12], index[13], index[14], index[15]};
-    __m256 lo[4], hi[4];
-    avx2_gather4(base, id, lo);
-    avx2_gather4(base, id + 8, hi);
-    *x = VF(lo[0], hi[0]);
-    *y = VF(lo[1], hi[1]);
-    *z = VF(lo[2], hi[2]);
-    *w = VF(lo[3], hi[3]);
+static inline void vf_gather4_i16(const Float4 *base, const int16_t *halves, Vf *x, Vf *y, Vf *z, Vf *w) {
+    GATHER4(base, halves, x, y, z, w);
 }
 static inline void vf_load4(const Float4 *p, Vf *x, Vf *y, Vf *z, Vf *w) {
-    static const int32_t id[8] = {0, 1, 2, 3, 4, 5, 6, 7};
-    __m256 lo[4], hi[4];
-    avx2_gather4(p, id, lo);
-    avx2_gather4(p + 8, id, hi);
-    *x = VF(lo[0], hi[0]);
-    *y = VF(lo[1], hi[1]);
-    *z = VF(lo[2], hi[2]);
-    *w = VF(lo[3], hi[3]);
+    static const int32_t in_order[LANES] = {0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30};
+    GATHER4(p, in_order, x, y, z, w);
 }
+#undef GATHER4
 static inline void avx2_store4(Float4 *p, __m256 x, __m256 y, __m256 z, __m256 w) {
     __m256 r[4] = {x, y, z, w}, out[4];
     avx2_transpose4(r, out);
@@ -451,30 +473,46 @@ static inline Vf vf_load_i16(const int16_t *p) {
     EACH_LANE r.v[l] = (float)p[l];
     return r;
 }
+static inline Vf vf_load_u16(const uint16_t *p) {
+    Vf r;
+    EACH_LANE r.v[l] = (float)p[l];
+    return r;
+}
+static inline Vi vi_round(Vf a) {
+    Vi r;
+    EACH_LANE r.v[l] = (int32_t)lrintf(a.v[l]);
+    return r;
+}
+static inline Vf vf_from_int(Vi a) {
+    Vf r;
+    EACH_LANE r.v[l] = (float)a.v[l];
+    return r;
+}
+static inline void vi_stream_i16_pair(int16_t *p, Vi a, Vi b) {
+    EACH_LANE p[l] = (int16_t)a.v[l];
+    EACH_LANE p[LANES + l] = (int16_t)b.v[l];
+}
+static inline void simd_stream_end(void) {}
 static inline void vf_store_i16(int16_t *p, Vf a) {
     EACH_LANE p[l] = (int16_t)lrintf(a.v[l]);
 }
-static inline Vf vf_gather(const float *base, Vi index) {
-    Vf r;
-    EACH_LANE r.v[l] = base[index.v[l]];
-    return r;
-}
-static inline Vi vi_gather(const int32_t *base, Vi index) {
-    Vi r;
-    EACH_LANE r.v[l] = base[index.v[l]];
-    return r;
-}
-static inline void vf_gather4(const Float4 *base, Vi index, Vf *x, Vf *y, Vf *z, Vf *w) {
+static inline void vf_gather4_i32(const Float4 *base, const int32_t *halves, Vf *x, Vf *y, Vf *z, Vf *w) {
     EACH_LANE {
-        const float *p = base[index.v[l]];
+        const float *p = float4_at(base, halves[l]);
         x->v[l] = p[0];
         y->v[l] = p[1];
         z->v[l] = p[2];
         w->v[l] = p[3];
     }
 }
-static inline void vf_gather4_i16(const Float4 *base, const int16_t *index, Vf *x, Vf *y, Vf *z, Vf *w) {
-    vf_gather4(base, vi_load_i16(index), x, y, z, w);
+static inline void vf_gather4_i16(const Float4 *base, const int16_t *halves, Vf *x, Vf *y, Vf *z, Vf *w) {
+    EACH_LANE {
+        const float *p = float4_at(base, halves[l]);
+        x->v[l] = p[0];
+        y->v[l] = p[1];
+        z->v[l] = p[2];
+        w->v[l] = p[3];
+    }
 }
 static inline void vf_load4(const Float4 *p, Vf *x, Vf *y, Vf *z, Vf *w) {
     EACH_LANE {
@@ -518,6 +556,14 @@ static inline int vi_compress(int32_t *out, const int32_t *ids, Vm m) {
 #endif
 
 /* ---- On top of the above, the same text on every path ---- */
+
+#ifndef SIMD_AVX512
+static inline void vi_transpose16(const int32_t *rows, int stride, int32_t out[LANES][LANES]) {
+    for (int k = 0; k < LANES; k++)
+        for (int l = 0; l < LANES; l++)
+            out[k][l] = rows[l * stride + k];
+}
+#endif
 
 static inline Vf vf_zero(void) {
     return vf_set(0.0f);

@@ -24,8 +24,8 @@ typedef struct TankKind {
 static const TankKind TANKS[] = {
     {"box", SKIFF_GEOMETRY_BOX, true},       {"cylinder", SKIFF_GEOMETRY_CYLINDER, true},
     {"sphere", SKIFF_GEOMETRY_SPHERE, true}, {"star", SKIFF_GEOMETRY_STAR, false},
-    {"cone", SKIFF_GEOMETRY_CONE, true},     {"pyramids", SKIFF_GEOMETRY_MESH, false},
-    {"harbour", SKIFF_GEOMETRY_MESH, true},
+    {"cone", SKIFF_GEOMETRY_CONE, true},     {"pyramids", SKIFF_GEOMETRY_MESH, true},
+    {"harbour", SKIFF_GEOMETRY_MESH, false},
 };
 
 /* What a case is made of; the def points into it. */
