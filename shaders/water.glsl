@@ -50,7 +50,8 @@ Water find_water(vec3 ray, float mesh_there) {
     fluid = abs(fluid.z - nearest.z) > sphere.x ? nearest : fluid;
     // Where no particle is, the ocean; but a hole inside the window is the inside of a boat.
     float depth = covered ? fluid.z + plane_depth(ray) : still;
-    float part = fluid_part((eye.xyz + ray * depth).xz);
+    // Who looks under the rim of the particles looks through the ocean, which begins in front of it.
+    float part = fluid_part((eye.xyz + ray * (ocean ? min(depth, still) : depth)).xz);
     bool hole = !covered && part * mesh_there > 0.5;
     part = covered ? part : 0.0;
     vec3 n = vec3(fluid.xy, sqrt(max(0.003, 1.0 - dot(fluid.xy, fluid.xy))));
