@@ -66,6 +66,7 @@ typedef struct RestCloud {
     Buffer frozen, held;              /* [points] 1: gets no row; gets one but does not move */
     Buffer state, constant, walls, sum, density, order; /* rest_select.c */
     Buffer kept[PARTICLE_FIELD_COUNT + 1];              /* existing water as it was, and its densities */
+    Buffer whence[2];                                   /* where existing water stands in `kept` */
 } RestCloud;
 
 struct SkiffSim;

@@ -33,7 +33,7 @@ static const float PART_SHARE = 0.1f;
 /* What settles, and with what. */
 typedef struct Settle {
     SkiffSim *sim;
-    SkiffParams params; /* the simulation's, changed for the purpose */
+    SkiffParams params; /* the simulation's, changed for the purpose by run_steps */
     Particles *particles;
     Grid *grid;
     Rows *rows;
@@ -42,7 +42,8 @@ typedef struct Settle {
     const uint8_t *frozen; /* [particles] 1: no row; or NULL */
     const uint8_t *held;   /* [particles] 1: does not move; or NULL */
     uint32_t active;
-    int steps; /* at most */
+    int steps;     /* at most */
+    bool yields;   /* existing water beside the new moves too */
     float surface; /* y, m */
 } Settle;
 
@@ -69,7 +70,6 @@ static bool settle_rows(Settle *settle, Err *err) {
 static Settle settle_cloud(SkiffSim *sim) {
     RestCloud *cloud = &sim->rest;
     return (Settle){.sim = sim,
-                    .params = sim->params,
                     .particles = &cloud->points,
                     .grid = &cloud->grid,
                     .rows = &cloud->rows,
@@ -175,13 +175,34 @@ static bool search_cloud(Settle *settle, uint64_t first_id, Err *err) {
     return rest_search(settle->sim, 1u << REST_ACTIVE, err);
 }
 
+/* Does a particle with an id from `first_id` on stand beside i? */
+static bool beside_new(const Settle *settle, uint32_t i, uint64_t first_id) {
+    RestNeighbour row[MAX_NEIGHBOURS];
+    const int length = rest_row(&settle->rows->pairs, i, row);
+    for (int k = 0; k < length; k++)
+        if (settle->particles->id[row[k].index] >= first_id)
+            return true;
+    return false;
+}
+
 static bool search_all(Settle *settle, uint64_t first_id, Err *err) {
-    if (!settle_sort(settle, err))
+    RestCloud *cloud = &settle->sim->rest;
+    if (!settle_sort(settle, err) || !settle_rows(settle, err))
         return false;
-    uint8_t *held = settle->sim->rest.held.data;
-    for (uint32_t i = 0; i < settle->particles->count; i++)
-        held[i] = settle->particles->id[i] < first_id;
-    return settle_rows(settle, err);
+    if (settle->held == NULL)
+        return true;
+    uint8_t *held = cloud->held.data;
+    const uint32_t *from = cloud->whence[0].data, *order = settle->grid->order;
+    uint32_t *to = cloud->whence[1].data;
+#pragma omp parallel for schedule(static, BLOCK) num_threads(settle->sim->threads)
+    for (uint32_t i = 0; i < settle->particles->count; i++) {
+        to[i] = from[order[i]];
+        held[i] = settle->particles->id[i] < first_id && !(settle->yields && beside_new(settle, i, first_id));
+    }
+    const Buffer swap = cloud->whence[0];
+    cloud->whence[0] = cloud->whence[1];
+    cloud->whence[1] = swap;
+    return true;
 }
 
 static bool beside_moving(const Settle *settle, uint32_t i) {
@@ -239,7 +260,10 @@ static void part_pairs(const Settle *settle) {
 }
 
 static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, SkiffFill *fill, Err *err) {
+    if (settle->steps == 0)
+        return true;
     SkiffParams *params = &settle->params;
+    *params = settle->sim->params;
     const double unit = (double)(params->particle_radius / params->time_step);
     const float scale = step_scale(settle);
     params->max_density_error = params->rest_density_error;
@@ -271,8 +295,7 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
         const SpeedSums speeds = measure_speeds(settle);
         fill->mean_speed = speeds.mean;
         fill->max_speed = speeds.max;
-        calm = step + 1 >= params->rest_min_steps &&
-               speeds.max < (double)params->rest_max_speed * unit &&
+        calm = step + 1 >= params->rest_min_steps && speeds.max < (double)params->rest_max_speed * unit &&
                speeds.mean < (double)params->rest_mean_speed * unit;
         move_active(settle, kept_share(params, step));
     }
@@ -330,13 +353,36 @@ bool rest_settle(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err
            run_steps(&settle, search_cloud, 0, fill, err);
 }
 
+/* Existing water stands still while what is beside it settles, and then goes on as it went. */
+static bool stop_existing(SkiffSim *sim, uint64_t first_id, Err *err) {
+    RestCloud *cloud = &sim->rest;
+    for (int k = 0; k < 2; k++)
+        if (!buffer_reserve(&cloud->whence[k], "order of existing water",
+                            sim->particles.capacity * sizeof(uint32_t), err))
+            return false;
+    uint32_t *whence = cloud->whence[0].data;
+    for (uint32_t i = 0; i < sim->particles.count; i++) {
+        whence[i] = i;
+        if (sim->particles.id[i] < first_id)
+            memset(sim->particles.velocity[i], 0, sizeof(Float4));
+    }
+    return true;
+}
+
+static void restart_existing(SkiffSim *sim, uint64_t first_id) {
+    const Float4 *velocity = sim->rest.kept[PARTICLE_velocity].data;
+    const uint32_t *whence = sim->rest.whence[0].data;
+    for (uint32_t i = 0; i < sim->particles.count; i++)
+        if (sim->particles.id[i] < first_id)
+            memcpy(sim->particles.velocity[i], velocity[whence[i]], sizeof(Float4));
+}
+
 /* All of the simulation's particles with ids from `first_id` on; all others are held. */
 static bool settle_all(SkiffSim *sim, float surface, uint64_t first_id, SkiffFill *fill, Err *err) {
     const SkiffParams *params = &sim->params;
-    const bool second = fill->steps > 0; /* shell: after the layer */
-    const int steps = second ? params->rest_final_steps : params->rest_steps;
+    const bool layer_done = fill->steps > 0;
     fill->active = fill->particles;
-    if (fill->active == 0 || steps == 0)
+    if (fill->active == 0)
         return true;
     still_existing(sim);
     if (!buffer_reserve(&sim->rest.held, "held particles", sim->particles.capacity + SLICE, err))
@@ -344,7 +390,6 @@ static bool settle_all(SkiffSim *sim, float surface, uint64_t first_id, SkiffFil
     const bool nothing_else = fill->active == sim->particles.count;
     memset(sim->rest.held.data, 0, sim->particles.capacity + SLICE);
     Settle settle = {.sim = sim,
-                     .params = sim->params,
                      .particles = &sim->particles,
                      .grid = &sim->grid,
                      .rows = &sim->rows,
@@ -352,9 +397,15 @@ static bool settle_all(SkiffSim *sim, float surface, uint64_t first_id, SkiffFil
                      .dfsph = &sim->dfsph,
                      .held = nothing_else ? NULL : sim->rest.held.data,
                      .active = fill->active,
-                     .steps = steps,
+                     .steps = layer_done ? 0 : params->rest_steps,
                      .surface = surface};
-    const bool good = run_steps(&settle, search_all, first_id, fill, err);
+    bool good = (nothing_else || stop_existing(sim, first_id, err)) &&
+                run_steps(&settle, search_all, first_id, fill, err);
+    settle.steps = params->rest_final_steps;
+    settle.yields = params->rest_settle == REST_SETTLE_SHELL;
+    good = good && run_steps(&settle, search_all, first_id, fill, err);
+    if (good && !nothing_else)
+        restart_existing(sim, first_id);
     for (uint32_t i = 0; i < sim->particles.count; i++)
         if (sim->particles.id[i] >= first_id)
             memset(sim->particles.velocity[i], 0, sizeof(Float4));
@@ -450,9 +501,9 @@ void rest_cloud_free(RestCloud *cloud) {
     cloud->boundary.fixed = cloud->boundary.moving = (BoundarySet){0};
     boundary_free(&cloud->boundary);
     dfsph_free(&cloud->dfsph);
-    Buffer *buffers[] = {&cloud->marks,  &cloud->laid, &cloud->source,  &cloud->fate,
-                         &cloud->frozen, &cloud->held, &cloud->state,   &cloud->constant,
-                         &cloud->walls,  &cloud->sum,  &cloud->density, &cloud->order};
+    Buffer *buffers[] = {&cloud->marks,   &cloud->laid,  &cloud->source,    &cloud->fate,     &cloud->frozen,
+                         &cloud->held,    &cloud->state, &cloud->constant,  &cloud->walls,    &cloud->sum,
+                         &cloud->density, &cloud->order, &cloud->whence[0], &cloud->whence[1]};
     for (size_t b = 0; b < sizeof buffers / sizeof *buffers; b++)
         buffer_free(buffers[b]);
     for (int f = 0; f <= PARTICLE_FIELD_COUNT; f++)
