@@ -3,12 +3,12 @@
  * back from the walls of the tank (shallow water: sqrt(g h), to the side and back about 3.6 s). */
 #include "experiment.h"
 
-enum { CELLS = 25, HALF = CELLS / 2 }; /* cells of the map of the surface, to a side */
+enum { CELLS = 15, HALF = CELLS / 2 }; /* cells of the map of the surface, to a side */
 
 static const double radius_default = 0.05, level = 0.9, window_radius = 2.5; /* m */
 static const double speed = 1.4, ramp = 1.0;                                 /* m/s, s */
 static const double from = 2.0, surface_from = 3.0, to = 3.6;                /* s */
-static const double cell = 0.16;                                             /* m */
+static const double cell = 0.25;                                             /* m */
 
 typedef struct Twin {
     double drag;                 /* mean, N, against the motion */

@@ -273,7 +273,7 @@ static void the_wedge_parts_the_corridor(void **state) {
     assert_float_equal(max[0], 1, 1e-3);
     assert_true(wedge->density == 800 && wedge->stop_time == 0.72);
     assert_float_equal(shape_volume(&scene->def.tank.geometry, min, max), 50, 1e-3);
-    assert_true(scene->def.sea.has_region && scene->def.sea.region_min[2] == 4.875f);
+    assert_true(scene->def.sea.has_region && scene->def.sea.region_min[2] == 4.5f);
     scene_free(scene);
 }
 
