@@ -77,6 +77,9 @@ typedef struct RestCloud {
 bool rest_fill(struct SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err);
 void rest_cloud_free(RestCloud *cloud);
 
+/* Loads the simulation's tile if it has none, and checks that its params suit it. */
+bool rest_check_tile(struct SkiffSim *sim, Err *err);
+
 /* The stages of rest_fill. */
 bool rest_gather(struct SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err);
 bool rest_select(struct SkiffSim *sim, SkiffFill *fill, Err *err);
