@@ -70,6 +70,7 @@ typedef struct RestCloud {
     Buffer frozen, held;              /* [points] 1: gets no row; gets one but does not move */
     Buffer state, constant, walls, sum, density, order; /* rest_select.c */
     Buffer kept[PARTICLE_FIELD_COUNT + 1];              /* existing water as it was, and its densities */
+    Buffer whence[2];                                   /* where existing water stands in `kept` */
 } RestCloud;
 
 /* Fills and appends the new particles to the simulation's. False: no memory, or the water is too dense
@@ -77,7 +78,8 @@ typedef struct RestCloud {
 bool rest_fill(struct SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err);
 void rest_cloud_free(RestCloud *cloud);
 
-/* Loads the simulation's tile if it has none, and checks that its params suit it. */
+/* Loads the tile of water at rest unless it is there; false when it is not made for the scene's volumeFactor.
+ */
 bool rest_check_tile(struct SkiffSim *sim, Err *err);
 
 /* The stages of rest_fill. */
