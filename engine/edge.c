@@ -128,9 +128,12 @@ static bool move_water(SkiffSim *sim, const EdgePlace *place, Err *err) {
 /* After move_water, and when nobody needs to know any more who was edge. */
 static void set_free(SkiffSim *sim, uint32_t count) {
     const float *distance = sim->sea.distance_buffer.data;
+    Particles *particles = &sim->particles;
     for (uint32_t i = 0; i < count; i++)
-        if (distance[i] < 0.0f)
-            sim->particles.edge[i] = EDGE_NONE;
+        if (distance[i] < 0.0f && particles->edge[i] != EDGE_NONE) {
+            particles->edge[i] = EDGE_NONE;
+            particles->prediction[i] = -1.0f;
+        }
 }
 
 /* ---- What comes ---- */
