@@ -257,6 +257,10 @@ static Errors evaluate_residual(Dfsph *dfsph, const DfsphProblem *problem, const
     return (Errors){totals[0] / count, totals[1] / count};
 }
 
+/* Water that has just been set free (particles.inl) takes this long to correct its density as fast as other
+ * water, s: others have crowded it while it could not yield. */
+static const float YIELD_TIME = 0.1f;
+
 /* What a density solve corrects: a share gamma of the density error, and the error that this step's motion
  * will add because D v is only the tangent. That is taken to be what the last step's motion added. Without it
  * a fast flow carries an error of 1 / gamma times a step's. */
@@ -271,18 +275,26 @@ static float density_source(const SkiffParams *params, float density, float pred
     if (moves && prediction > 0.0f && density > DENSE && params->pressure_solver == 0)
         expected = params->feedforward * (density - prediction);
     expected = expected > LARGEST ? LARGEST : expected < -LARGEST ? -LARGEST : expected;
-    return params->softening * (density - 1.0f) + expected;
+    const float patience = prediction < 0.0f ? 1.0f + prediction : 1.0f;
+    return patience * params->softening * (density - 1.0f) + expected;
 }
 
 /* Density that the velocities found lead to: rho + dt D v, from the residual that is left. */
 static void predict_density(const Dfsph *dfsph, const DfsphProblem *problem) {
     const uint32_t blocks = particles_blocks(problem->particles);
     const float *density = problem->rows->pairs.density;
+    const float less = problem->params->time_step / YIELD_TIME;
     EACH_BLOCK {
-        for (uint32_t i = block * BLOCK; i < (block + 1) * BLOCK; i++)
-            if (problem->held == NULL || !problem->held[i])
-                problem->particles->prediction[i] =
+        for (uint32_t i = block * BLOCK; i < (block + 1) * BLOCK; i++) {
+            float *prediction = &problem->particles->prediction[i];
+            if (problem->held != NULL && problem->held[i])
+                continue;
+            if (*prediction < -less)
+                *prediction += less;
+            else
+                *prediction =
                     dfsph->inv_diagonal[i] > 0.0f ? density[i] + dfsph->residual[i] - dfsph->source[i] : 0.0f;
+        }
     }
 }
 
