@@ -283,6 +283,7 @@ static const Command commands[] = {
      "and state.skiff (checkpoint); with pictures also frames/ and video.mp4.\n"
      "Ctrl-C finishes the step, writes a checkpoint and the report, and exits with 130; --resume goes on "
      "from there.\n",
+     "  skiff run assets/scenes/boat.json --input assets/inputs/slalom.input -o out/slalom --no-render\n"
      "  skiff run assets/scenes/settling-tank.json -o out/tank\n"
      "  skiff run assets/scenes/dam-body.json -o out/dam --duration 2 --set RigidBodies[0].density=300\n"
      "  skiff run assets/scenes/dam-body.json -o out/dam --resume --duration 4\n"
@@ -324,8 +325,8 @@ static const Command commands[] = {
      "Cuts the tile that is part of the program at a level and lets what is left settle there, repeating\n"
      "without end to all sides. The sea ahead of a window is made of it and of the tile below. The surface\n"
      "itself is part of the program, too; it has to be made anew when the tile is.\n",
-     "  skiff rest surface -o assets/rest/surface.skiff\n",
-     rest_surface_options, COUNT(rest_surface_options), rest_surface_command},
+     "  skiff rest surface -o assets/rest/surface.skiff\n", rest_surface_options, COUNT(rest_surface_options),
+     rest_surface_command},
     {"rest cut", "folder", true, "DIR -o FILE", "Cut a block of water at rest out of a finished run",
      "Takes the particles of a box out of the last state of a run, a tank that has settled, and prints how "
      "much\n"
@@ -402,7 +403,10 @@ static void print_wrapped(const char *text, int indent, int width) {
 static void print_usage(const Command *command) {
     char usage[64];
     snprintf(usage, sizeof usage, "skiff %s %s", command->name, command->arguments);
-    printf("  %-28s %s\n", usage, command->summary);
+    printf("  %-28s", usage);
+    if (strlen(usage) > 28)
+        printf("\n  %-28s", "");
+    printf(" %s\n", command->summary);
 }
 
 static void print_main_help(void) {
@@ -414,7 +418,8 @@ static void print_main_help(void) {
     fputs(
         "\nScenes are JSON files; assets/scenes has examples and `skiff check --schema` lists every key.\n"
         "\nExamples:\n"
-        "  skiff run assets/scenes/settling-tank.json -o out/tank     then open out/tank/report.html\n"
+        "  skiff run assets/scenes/boat.json -o out/boat --video      then open out/boat/report.html\n"
+        "  skiff profile out/boat\n"
         "  skiff check assets/scenes/floating-box.json\n"
         "  skiff bench assets/scenes/bench-tank.json --json\n"
         "\nExit codes: 0 ok, 2 usage, 3 bad input, 4 no OpenGL, 5 diverged, 6 reading or writing failed, 130 "
