@@ -96,7 +96,8 @@ vec4 see_through(Water water, float ray_length, vec2 bend, float thickness, vec3
 float foam_cover(vec2 p, float amount, float level) {
     float coarse = ripple_layer(2, p, level).z, fine = ripple_layer(3, p, level).w;
     float pattern = 0.50 * coarse + 0.50 * fine;
-    float dense = 1.0 - exp(-1.3 * amount);
+    float patches = ripple_layer(1, p, level).w; // where it has torn open
+    float dense = 1.0 - exp(-1.3 * amount * (0.55 + 1.1 * patches));
     float cells = smoothstep(0.80 - dense, 2.1 - 1.2 * dense, pattern + 0.25 * dense) * min(1.0, 4.0 * dense);
     float veil = 0.42 * dense * dense;
     return clamp(cells + (1.0 - cells) * veil, 0.0, 0.95);
