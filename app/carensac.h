@@ -107,9 +107,12 @@ enum {
     CARENSAC_FILL_COUNT
 };
 
-/* Set-up of an experiment of table1; fig2 and fig4c use the floating cube. Files it needs are written to
- * `folder`. */
-bool carensac_set_up(int experiment, const char *folder, CarensacSetup *setup, Err *err);
+/* Particle radius of all of the paper's experiments, m. */
+#define CARENSAC_RADIUS 0.025
+
+/* Set-up of an experiment of table1 for particles of `radius` (m); fig2 and fig4c use the floating cube.
+ * Files it needs are written to `folder`. */
+bool carensac_set_up(int experiment, double radius, const char *folder, CarensacSetup *setup, Err *err);
 /* Set-up of fig5: a wedge that falls into a corridor. */
 void carensac_set_up_wedge(CarensacSetup *setup);
 

@@ -37,6 +37,7 @@ typedef struct CliArgs {
     double min[3], max[3]; /* rest cut, m; NaN: not given */
     int free_steps;        /* rest fill */
     int runs;              /* reproduce */
+    double radius;         /* reproduce, m */
     bool help;
 } CliArgs;
 

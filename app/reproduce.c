@@ -145,7 +145,7 @@ typedef struct Filling {
 
 static bool fill_row(Reproduction *run, Sheet *sheet, int row, const Filling *filling, Err *err) {
     CarensacSetup setup;
-    if (!carensac_set_up(filling->experiment, run->folder, &setup, err))
+    if (!carensac_set_up(filling->experiment, run->args->radius, run->folder, &setup, err))
         return false;
     if (filling->method == CARENSAC_PAPER)
         carensac_set_paper_method(&setup.def.params);
@@ -221,7 +221,7 @@ static bool sum_up_floating(Reproduction *run, int row, Err *err) {
 
 static bool float_row(Reproduction *run, int row, Err *err) {
     CarensacSetup setup;
-    if (!carensac_set_up(CARENSAC_FLOATING_CUBE, run->folder, &setup, err))
+    if (!carensac_set_up(CARENSAC_FLOATING_CUBE, run->args->radius, run->folder, &setup, err))
         return false;
     if (row == CARENSAC_PAPER)
         carensac_set_paper_method(&setup.def.params);
@@ -317,6 +317,10 @@ static bool write_page(const Reproduction *run, Err *err) {
             ", %d of %d cores, %s, commit <code>%s</code>; the paper's times are of a GPU, an RTX 2070 SUPER"
             "</p>\n",
             run->machine.threads, run->machine.cores, run->machine.isa, run->machine.commit);
+    if (run->args->radius != CARENSAC_RADIUS)
+        fprintf(out,
+                "<p>Particles of radius %g m where the paper has %g m: a quick look, not a comparison.</p>\n",
+                run->args->radius, CARENSAC_RADIUS);
     fputs("<p>Rows with the paper's name follow its method: only particles near solids and existing water "
           "settle, for at most ten steps, and nothing is calmed afterwards either. Rows named "
           "<i>defaults</i> are what the program does by itself.</p>\n",
