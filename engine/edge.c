@@ -161,7 +161,8 @@ static bool sort_rim(SkiffSim *sim, EdgePlace *place, Err *err) {
     memset(start, 0, (cells + 2) * sizeof(uint32_t));
     for (uint32_t i = 0; i < particles->count; i++) {
         const float *p = particles->position[i];
-        if (distance_before(place, p) < place->support - RIM * place->radius)
+        if (particles->edge[i] == EDGE_NONE ||
+            distance_before(place, p) < place->support - RIM * place->radius)
             continue;
         start[grid_cell_of(grid, p) + 2]++;
         found[count++] = i;
