@@ -150,10 +150,31 @@ static bool fill_ring(SkiffSim *sim, const WindowPlace *place, Err *err) {
     return good;
 }
 
+/* A body that is faster than the largest move a step gets ahead of its window and out of the water. */
+static bool check_followed(const SkiffSim *sim, Err *err) {
+    if (sim->sea.follow < 0)
+        return true;
+    const Body *body = &sim->bodies[sim->sea.follow];
+    float p[3];
+    for (int k = 0; k < 3; k++)
+        p[k] = (float)(body->position[k] - sim->origin[k]);
+    const double out = (double)shape_distance_sides(&sim->tank, p, NULL);
+    if (!(out > 0.0))
+        return true;
+    const double cap = (double)(sim->params.window_cap * sim->kernel.support);
+    return err_set(err, ERR_DIVERGED,
+                   "body '%s' has left the window, by %.3g m: it moves %.3g m a step, the window at most "
+                   "windowCap, %.3g m",
+                   body->name, out,
+                   hypot(body->velocity[0], body->velocity[2]) * (double)sim->params.time_step, cap);
+}
+
 bool window_follow(SkiffSim *sim, Err *err) {
     WindowPlace place = {.sim = sim, .walls = &sim->tank};
     if (!next_shift(sim, place.shift))
         return true;
+    if (!check_followed(sim, err))
+        return false;
     if (sim->sea.water_edge) {
         sim->sea.moves++;
         sim->stats.moved = true;

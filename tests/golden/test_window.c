@@ -32,8 +32,18 @@ static SkiffBodyDef fixed_box(const char *name, const float size[3], float x, fl
     return box;
 }
 
-static SkiffSim *make_sea(int threads, SkiffSimd simd, double start, bool has_fixed) {
-    static const double pull = 2.6; /* m/s */
+/* What differs from one test to the next. */
+typedef struct Sea {
+    double start; /* m */
+    float pull;   /* m/s */
+    float cap;    /* h */
+    bool has_fixed;
+} Sea;
+
+static const Sea plain_sea = {.pull = 2.6f, .cap = 3.5f};
+
+static SkiffSim *make_sea(int threads, SkiffSimd simd, const Sea *sea) {
+    const double start = sea->start;
     SkiffDef def = skiff_def_default();
     Err err = {0};
     def.threads = threads;
@@ -61,11 +71,12 @@ static SkiffSim *make_sea(int threads, SkiffSimd simd, double start, bool has_fi
     crate.geometry.translation[1] = 0.4f;
     crate.density = 500.0f;
     crate.free_axes = SKIFF_FREE_ALL & ~SKIFF_FREE_X;
-    crate.velocity[0] = (float)pull;
+    crate.velocity[0] = sea->pull;
+    def.params.window_cap = sea->cap;
     const SkiffBodyDef bodies[3] = {crate, fixed_box("pillar", pillar_size, 1.9f, 1.1f),
                                     fixed_box("rock", pillar_size, -2e4f, 3e4f)};
     def.bodies = bodies;
-    def.body_count = has_fixed ? 3 : 1;
+    def.body_count = sea->has_fixed ? 3 : 1;
     SkiffSim *sim = skiff_create(&def, &err);
     if (sim == NULL)
         fail_msg("%s", err.message);
@@ -73,7 +84,9 @@ static SkiffSim *make_sea(int threads, SkiffSimd simd, double start, bool has_fi
 }
 
 static SkiffSim *make(int threads, SkiffSimd simd, double start) {
-    return make_sea(threads, simd, start, false);
+    Sea sea = plain_sea;
+    sea.start = start;
+    return make_sea(threads, simd, &sea);
 }
 
 static void run(SkiffSim *sim, int steps) {
@@ -162,7 +175,9 @@ static void test_far_away(void **state) {
  * and leaves behind, one is so far that cells over both would not fit into memory. */
 static void test_fixed_bodies(void **state) {
     (void)state;
-    SkiffSim *sim = make_sea(2, SKIFF_SIMD_AUTO, 0.0, true);
+    Sea sea = plain_sea;
+    sea.has_fixed = true;
+    SkiffSim *sim = make_sea(2, SKIFF_SIMD_AUTO, &sea);
     const SkiffBody pillar = skiff_body(sim, 1);
     double deepest = -INFINITY, force = 0.0;
     for (int k = 0; k < 3 * STEPS; k++) {
@@ -186,6 +201,23 @@ static void test_fixed_bodies(void **state) {
     skiff_destroy(sim);
 }
 
+/* A body that is faster than the window may move gets out of it: that is said, not drawn. */
+static void test_outrun(void **state) {
+    (void)state;
+    Err err = {0};
+    const Sea sea = {.pull = 20.0f, .cap = 0.2f};
+    SkiffSim *sim = make_sea(2, SKIFF_SIMD_AUTO, &sea);
+    bool good = true;
+    for (int k = 0; good && k < STEPS; k++)
+        good = skiff_step(sim, &err);
+    assert_false(good);
+    assert_int_equal(err.code, ERR_DIVERGED);
+    const char *expected = "body 'crate' has left the window";
+    if (strstr(err.message, expected) == NULL || strstr(err.message, "windowCap") == NULL)
+        fail_msg("%s", err.message);
+    skiff_destroy(sim);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_threads_and_instruction_sets),
@@ -193,6 +225,7 @@ int main(void) {
         cmocka_unit_test(test_ledger),
         cmocka_unit_test(test_far_away),
         cmocka_unit_test(test_fixed_bodies),
+        cmocka_unit_test(test_outrun),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
