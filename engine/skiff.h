@@ -175,7 +175,9 @@ typedef struct SkiffProbeDef {
 } SkiffProbeDef;
 
 /* A sea without end around the tank [Carensac2023 sec. 4]: the tank is filled to `level` with water at rest,
- * becomes the window that follows a body, and waves die at its walls. */
+ * becomes the window that follows a body, and waves die at its edge. One that moves has no walls unless
+ * windowEdge says so: the world's water at rest stands around it, one support wide, as particles that are
+ * part of the simulation's. */
 typedef struct SkiffSeaDef {
     bool on;
     float level;        /* y of the still surface, m */
@@ -489,8 +491,8 @@ SkiffTile *skiff_tile_make(const SkiffTileDef *def, Err *err);
 /* The particles inside [min, max] (m, world) as a block. NULL with ERR_INPUT: none is, or the box is too
  * small for a particle with all its neighbours. */
 SkiffTile *skiff_tile_cut(const SkiffSim *sim, const double min[3], const double max[3], Err *err);
-/* The built-in tile settled under a free surface, as a block whose sides repeat: what a sea is made of. Takes a
- * minute. */
+/* The built-in tile settled under a free surface, as a block whose sides repeat: what a sea is made of. Takes
+ * a minute. */
 SkiffTile *skiff_tile_surface(int threads, Err *err);
 /* Reads a file; path NULL: the tile that comes with the program. NULL with ERR_INPUT or ERR_IO. */
 SkiffTile *skiff_tile_open(const char *path, Err *err);

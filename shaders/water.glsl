@@ -50,7 +50,8 @@ Water find_water(vec3 ray, float mesh_there) {
     fluid = abs(fluid.z - nearest.z) > sphere.x ? nearest : fluid;
     // Where no particle is, the ocean; but a hole inside the window is the inside of a boat.
     float depth = covered ? fluid.z + plane_depth(ray) : still;
-    float part = fluid_part((eye.xyz + ray * depth).xz);
+    // Who looks under the rim of the particles looks through the ocean, which begins in front of it.
+    float part = fluid_part((eye.xyz + ray * (ocean ? min(depth, still) : depth)).xz);
     bool hole = !covered && part * mesh_there > 0.5;
     part = covered ? part : 0.0;
     vec3 n = vec3(fluid.xy, sqrt(max(0.003, 1.0 - dot(fluid.xy, fluid.xy))));
@@ -95,7 +96,8 @@ vec4 see_through(Water water, float ray_length, vec2 bend, float thickness, vec3
 float foam_cover(vec2 p, float amount, float level) {
     float coarse = ripple_layer(2, p, level).z, fine = ripple_layer(3, p, level).w;
     float pattern = 0.50 * coarse + 0.50 * fine;
-    float dense = 1.0 - exp(-1.3 * amount);
+    float patches = ripple_layer(1, p, level).w; // where it has torn open
+    float dense = 1.0 - exp(-1.3 * amount * (0.55 + 1.1 * patches));
     float cells = smoothstep(0.80 - dense, 2.1 - 1.2 * dense, pattern + 0.25 * dense) * min(1.0, 4.0 * dense);
     float veil = 0.42 * dense * dense;
     return clamp(cells + (1.0 - cells) * veil, 0.0, 0.95);
@@ -116,14 +118,16 @@ vec3 shade(Water water, vec3 direction, float ray_length, vec3 background, vec3 
     float footprint = far * 2.0 * lens.y * size.w * inversesqrt(max(abs(direction.y), 0.03));
     float level = ripple_level(footprint);
     vec2 slopes = ripple_slopes(water.place.xz, level) * smoothstep(0.2, 0.75, n.y);
-    n = normalize(n - vec3(slopes.x, 0.0, slopes.y) * (1.0 - 0.3 * water.fluid));
+    n = normalize(n - vec3(slopes.x, 0.0, slopes.y));
     float facing = dot(n, direction);
     if (facing > -0.03) { // turned away: as steep as can be seen
         n = normalize(n - direction * (facing + 0.04));
         facing = dot(n, direction);
     }
     float grazing = 1.0 + facing, grazing_sq = grazing * grazing;
-    float mirror = min(0.02 + 0.98 * grazing_sq * grazing_sq * grazing, 0.82);
+    // Steep faces are rough: they mirror little.
+    float most = mix(0.35, 0.82, smoothstep(0.5, 0.9, n.y));
+    float mirror = min(0.02 + 0.98 * grazing_sq * grazing_sq * grazing, most);
     vec3 up = reflect(direction, n);
     // Ripples too small to see still tilt what is seen: far water mirrors a higher sky.
     up.y = abs(up.y) + 0.02 + 0.16 * ground.w * smoothstep(0.02, 0.6, footprint);
@@ -133,7 +137,7 @@ vec3 shade(Water water, vec3 direction, float ray_length, vec3 background, vec3 
     float broad = power_of_64(towards_sun), narrow = broad * broad;
     narrow *= narrow; // 256
     narrow *= narrow * narrow * narrow; // 1024
-    float glint = 1.8 * narrow + 0.20 * broad;
+    float glint = 1.3 * narrow + 0.20 * broad;
     vec2 bend = (mat3(view) * (n - vec3(0.0, max(n.y, 0.0), 0.0))).xy;
     vec4 mesh_mirrored = vec4(0.0);
     if (HAS_MESHES)
