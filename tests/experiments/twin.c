@@ -56,6 +56,8 @@ static void add_heights(const SkiffSim *sim, double (*height)[CELLS]) {
     const SkiffParticles particles = skiff_particles(sim);
     const double share = experiment_particle_volume(sim) / (cell * cell);
     for (uint32_t i = 0; i < particles.count; i++) {
+        if ((double)particles.position[i][1] + particles.origin[1] < 0.0)
+            continue; /* below the floor: of the water at rest that stands around a moving window */
         const double x = (double)particles.position[i][0] + particles.origin[0] - hull.position[0];
         const double z = (double)particles.position[i][2] + particles.origin[2] - hull.position[2];
         const int column = (int)floor(x / cell + 0.5) + HALF, row = (int)floor(z / cell + 0.5) + HALF;
