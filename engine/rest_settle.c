@@ -606,9 +606,10 @@ void rest_cloud_free(RestCloud *cloud) {
     cloud->boundary.fixed = cloud->boundary.moving = (BoundarySet){0};
     boundary_free(&cloud->boundary);
     dfsph_free(&cloud->dfsph);
-    Buffer *buffers[] = {&cloud->marks,   &cloud->laid,  &cloud->source,    &cloud->fate,     &cloud->frozen,
-                         &cloud->held,    &cloud->state, &cloud->constant,  &cloud->walls,    &cloud->sum,
-                         &cloud->density, &cloud->order, &cloud->whence[0], &cloud->whence[1]};
+    Buffer *buffers[] = {&cloud->marks,    &cloud->clearance, &cloud->laid,     &cloud->source,
+                         &cloud->fate,     &cloud->frozen,    &cloud->held,     &cloud->state,
+                         &cloud->constant, &cloud->walls,     &cloud->sum,      &cloud->density,
+                         &cloud->order,    &cloud->whence[0], &cloud->whence[1]};
     for (size_t b = 0; b < sizeof buffers / sizeof *buffers; b++)
         buffer_free(buffers[b]);
     for (int f = 0; f <= PARTICLE_FIELD_COUNT; f++)
