@@ -2,6 +2,7 @@
  * Err into messages and the exit code. */
 #include "cli.h"
 
+#include "carensac.h"
 #include "commands.h"
 #include "nearest.h"
 #include "problems.h"
@@ -243,14 +244,13 @@ static const Option rest_fill_options[] = {
 };
 
 static const Option reproduce_options[] = {
-    {0, "radius", "R", OPTION_NUMBER, AT(radius), .min = 0.01, .max = 0.08,
-     .help =
-         "Particle radius of fig5 and boat, m (default 0.025, as the paper); larger for a quick look. The "
-         "time step grows with it"},
     {'d', "duration", "S", OPTION_NUMBER, AT(duration), .min = 0.1, .max = 1000,
      .help = "Simulated seconds of fig5 and boat (default 6.6 and 25, of which 5 without thrust)"},
     {0, "runs", "N", OPTION_INTEGER, AT(runs), .min = 1, .max = 10000,
      .help = "Fills of each row of table1 and fig2, each with another offset (default 51, as the paper)"},
+    {0, "radius", "R", OPTION_NUMBER, AT(radius), .min = 0.0125, .max = 0.1,
+     .help = "Particle radius, m (default 0.025, as the paper): 0.05 gives a quick look at an eighth of the "
+             "particles"},
     {'o', "output", "DIR", OPTION_TEXT, AT(output), .help = "Folder for report.html and the CSV files"},
     {0, "json", NULL, OPTION_FLAG, AT(json), .help = "One line of JSON for each row in place of the tables"},
     OPTION_ROWS_ENGINE,
@@ -283,6 +283,7 @@ static const Command commands[] = {
      "and state.skiff (checkpoint); with pictures also frames/ and video.mp4.\n"
      "Ctrl-C finishes the step, writes a checkpoint and the report, and exits with 130; --resume goes on "
      "from there.\n",
+     "  skiff run assets/scenes/boat.json --input assets/inputs/slalom.input -o out/slalom --no-render\n"
      "  skiff run assets/scenes/settling-tank.json -o out/tank\n"
      "  skiff run assets/scenes/dam-body.json -o out/dam --duration 2 --set RigidBodies[0].density=300\n"
      "  skiff run assets/scenes/dam-body.json -o out/dam --resume --duration 4\n"
@@ -324,8 +325,8 @@ static const Command commands[] = {
      "Cuts the tile that is part of the program at a level and lets what is left settle there, repeating\n"
      "without end to all sides. The sea ahead of a window is made of it and of the tile below. The surface\n"
      "itself is part of the program, too; it has to be made anew when the tile is.\n",
-     "  skiff rest surface -o assets/rest/surface.skiff\n",
-     rest_surface_options, COUNT(rest_surface_options), rest_surface_command},
+     "  skiff rest surface -o assets/rest/surface.skiff\n", rest_surface_options, COUNT(rest_surface_options),
+     rest_surface_command},
     {"rest cut", "folder", true, "DIR -o FILE", "Cut a block of water at rest out of a finished run",
      "Takes the particles of a box out of the last state of a run, a tank that has settled, and prints how "
      "much\n"
@@ -361,6 +362,7 @@ static const Command commands[] = {
      "itself.\n",
      "  skiff reproduce carensac2023 table1 --runs 5\n"
      "  skiff reproduce carensac2023 fig5 --radius 0.05 -o out/fig5\n"
+     "  skiff reproduce carensac2023 fig4c --radius 0.05 -o float\n"
      "  skiff reproduce carensac2023 all -o out/carensac2023\n",
      reproduce_options, COUNT(reproduce_options), reproduce_carensac_command},
     {"render", "folder of a run", true, "DIR", "Draw a finished run again, or export its particles",
@@ -402,7 +404,10 @@ static void print_wrapped(const char *text, int indent, int width) {
 static void print_usage(const Command *command) {
     char usage[64];
     snprintf(usage, sizeof usage, "skiff %s %s", command->name, command->arguments);
-    printf("  %-28s %s\n", usage, command->summary);
+    printf("  %-28s", usage);
+    if (strlen(usage) > 28)
+        printf("\n  %-28s", "");
+    printf(" %s\n", command->summary);
 }
 
 static void print_main_help(void) {
@@ -414,7 +419,8 @@ static void print_main_help(void) {
     fputs(
         "\nScenes are JSON files; assets/scenes has examples and `skiff check --schema` lists every key.\n"
         "\nExamples:\n"
-        "  skiff run assets/scenes/settling-tank.json -o out/tank     then open out/tank/report.html\n"
+        "  skiff run assets/scenes/boat.json -o out/boat --video      then open out/boat/report.html\n"
+        "  skiff profile out/boat\n"
         "  skiff check assets/scenes/floating-box.json\n"
         "  skiff bench assets/scenes/bench-tank.json --json\n"
         "\nExit codes: 0 ok, 2 usage, 3 bad input, 4 no OpenGL, 5 diverged, 6 reading or writing failed, 130 "

@@ -33,8 +33,14 @@ static const float MIN_DIAGONAL = 1e-6f;
 /* The divergence solve leaves out particles with fewer neighbours: spray has no divergence to speak of. */
 enum { MIN_NEIGHBOURS = 20 };
 /* The two-sided residual goes this far below the one-sided tolerance, so that the usual error, measured at
- * the next step, keeps it. */
-static const double SAFETY = 0.4;
+ * the next step, keeps it. In still water what is left over stays where it is, and forces on the floor
+ * flicker with it; in a flow that moves a fiftieth of the spacing a step, the motion's curved part is most of
+ * the error anyway. */
+static double safety(double motion) {
+    static const double STILL = 0.4, FLOWING = 0.6, STILL_MOTION = 0.002, FLOWING_MOTION = 0.02;
+    const double share = (motion - STILL_MOTION) / (FLOWING_MOTION - STILL_MOTION);
+    return STILL + (FLOWING - STILL) * (share < 0.0 ? 0.0 : share > 1.0 ? 1.0 : share);
+}
 
 bool dfsph_reserve(Dfsph *dfsph, uint32_t particle_capacity, uint32_t object_count, Err *err) {
     const size_t padded = particle_capacity + BLOCK, blocks = padded / BLOCK;
@@ -262,6 +268,10 @@ static Errors evaluate_residual(Dfsph *dfsph, const DfsphProblem *problem, const
     return (Errors){totals[0] / count, totals[1] / count};
 }
 
+/* Water that has just been set free (particles.inl) takes this long to correct its density as fast as other
+ * water, s: others have crowded it while it could not yield. */
+static const float YIELD_TIME = 0.1f;
+
 /* What a density solve corrects: a share gamma of the density error, and the error that this step's motion
  * will add because D v is only the tangent. That is taken to be what the last step's motion added. Without it
  * a fast flow carries an error of 1 / gamma times a step's. */
@@ -276,18 +286,26 @@ static float density_source(const SkiffParams *params, float density, float pred
     if (moves && prediction > 0.0f && density > DENSE && params->pressure_solver != SKIFF_SOLVER_JACOBI)
         expected = params->feedforward * (density - prediction);
     expected = expected > LARGEST ? LARGEST : expected < -LARGEST ? -LARGEST : expected;
-    return params->softening * (density - 1.0f) + expected;
+    const float patience = prediction < 0.0f ? 1.0f + prediction : 1.0f;
+    return patience * params->softening * (density - 1.0f) + expected;
 }
 
 /* Density that the velocities found lead to: rho + dt D v, from the residual that is left. */
 static void predict_density(const Dfsph *dfsph, const DfsphProblem *problem) {
     const uint32_t blocks = particles_blocks(problem->particles);
     const float *density = problem->rows->pairs.density;
+    const float less = problem->params->time_step / YIELD_TIME;
     EACH_BLOCK {
-        for (uint32_t i = block * BLOCK; i < (block + 1) * BLOCK; i++)
-            if (problem->held == NULL || !problem->held[i])
-                problem->particles->prediction[i] =
+        for (uint32_t i = block * BLOCK; i < (block + 1) * BLOCK; i++) {
+            float *prediction = &problem->particles->prediction[i];
+            if (problem->held != NULL && problem->held[i])
+                continue;
+            if (*prediction < -less)
+                *prediction += less;
+            else
+                *prediction =
                     dfsph->inv_diagonal[i] > 0.0f ? density[i] + dfsph->residual[i] - dfsph->source[i] : 0.0f;
+        }
     }
 }
 
@@ -327,6 +345,23 @@ static void prepare(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, f
             dfsph->source[i] = source_of(problem, kind, i);
         }
     }
+}
+
+/* Root mean square of the velocities, in particle spacings a step. */
+static double water_motion(const Dfsph *dfsph, const DfsphProblem *problem) {
+    const uint32_t blocks = particles_blocks(problem->particles);
+    const Float4 *velocity = (const Float4 *)problem->particles->velocity;
+    EACH_BLOCK {
+        double sum = 0.0; /* the padding of the last block is 0 */
+        for (uint32_t i = block * BLOCK; i < (block + 1) * BLOCK; i++)
+            sum += (double)(velocity[i][0] * velocity[i][0] + velocity[i][1] * velocity[i][1] +
+                            velocity[i][2] * velocity[i][2]);
+        dfsph->partials[block * DFSPH_SUMS] = sum;
+    }
+    double total;
+    total_partials(dfsph, blocks, 1, &total);
+    const double spacing = 2.0 * (double)problem->params->particle_radius;
+    return sqrt(total / problem->particles->count) * (double)problem->params->time_step / spacing;
 }
 
 /* ---- Conjugate residuals ---- */
@@ -410,11 +445,12 @@ static double gcr_update(Dfsph *dfsph, const DfsphProblem *problem, float *p, fl
 
 typedef struct SolveLimits {
     double tolerance; /* relative density */
+    double safety;
     int min, max;
 } SolveLimits;
 
 static SolveResult solve_gcr(Dfsph *dfsph, const DfsphProblem *problem, float *p, SolveLimits limits) {
-    const double tolerance = SAFETY * limits.tolerance;
+    const double tolerance = limits.safety * limits.tolerance;
     Errors errors = evaluate_residual(dfsph, problem, p);
     int iterations = 1;
     bool has_direction = false;
@@ -462,18 +498,23 @@ static SolveResult solve_jacobi(Dfsph *dfsph, const DfsphProblem *problem, float
 
 /* ---- The solve ---- */
 
-static SolveLimits solve_limits(const SkiffParams *params, SolveKind kind) {
+static SolveLimits solve_limits(const Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind) {
     /* what the flow leaves, the shift mends in the same step */
     static const double FLOW_TOLERANCE = 2.0;
+    const SkiffParams *params = problem->params;
     const double density = (double)params->max_density_error / 100.0;
     switch (kind) {
     case SOLVE_DIVERGENCE:
-        return (SolveLimits){(double)params->max_divergence_error / 100.0, params->min_divergence_iterations,
-                             params->max_divergence_iterations};
+        return (SolveLimits){(double)params->max_divergence_error / 100.0, safety(0.0),
+                             params->min_divergence_iterations, params->max_divergence_iterations};
     case SOLVE_FLOW:
-        return (SolveLimits){FLOW_TOLERANCE * density, params->min_iterations, params->max_iterations};
+        return (SolveLimits){FLOW_TOLERANCE * density, safety(0.0), params->min_iterations,
+                             params->max_iterations};
+    case SOLVE_SHIFT:
+        return (SolveLimits){density, safety(0.0), params->min_iterations, params->max_iterations};
     default:
-        return (SolveLimits){density, params->min_iterations, params->max_iterations};
+        return (SolveLimits){density, safety(water_motion(dfsph, problem)), params->min_iterations,
+                             params->max_iterations};
     }
 }
 
@@ -498,7 +539,7 @@ SolveResult dfsph_solve(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kin
     if (dfsph->moving)
         memset(dfsph->responses, 0, (1 + (size_t)problem->body_count) * sizeof *dfsph->responses);
     prepare(dfsph, problem, kind, p);
-    const SolveLimits limits = solve_limits(problem->params, kind);
+    const SolveLimits limits = solve_limits(dfsph, problem, kind);
     const SolveResult result = problem->params->pressure_solver == SKIFF_SOLVER_JACOBI
                                    ? solve_jacobi(dfsph, problem, p, limits)
                                    : solve_gcr(dfsph, problem, p, limits);

@@ -11,10 +11,13 @@
 
 /* Caught water goes on for a while, so that the water behind it need not stop at once; s. */
 static const float CATCH_TIME = 0.05f;
+/* By as much of its share pressures at rest may differ from that of still water: three times their spread. */
+static const float SHARE = 0.25f;
 /* Where the edge ends rounding decides who belongs to it: the same particle is closer than this, r. */
 static const float SAME = 0.5f;
-/* Laid water comes no closer than this to caught water; r. */
-static const float APART = 1.5f;
+/* Laid water comes no closer than this to caught water, r: at rest the particles of the surface come as close
+ * as 1.0. */
+static const float APART = 0.9f;
 /* How far beyond the old edge particles of it can lie in the way, r. */
 static const float RIM = 2.0f;
 
@@ -65,10 +68,15 @@ static float still_pressure(const SkiffSim *sim, const float p[3]) {
     return fmaxf(-params->gravity[1] * depth * params->time_step * params->time_step, 0.0f);
 }
 
+/* Water at rest keeps the pressure that balances it; that of moving water is one step's, and gives way to
+ * what still water has. */
 static void catch_particle(SkiffSim *sim, uint32_t i) {
-    sim->particles.edge[i] = EDGE_CAUGHT;
-    sim->particles.pressure[i] = still_pressure(sim, sim->particles.position[i]);
-    sim->particles.pressure_divergence[i] = 0.0f;
+    Particles *particles = &sim->particles;
+    const float still = still_pressure(sim, particles->position[i]);
+    particles->edge[i] = EDGE_CAUGHT;
+    if (!(fabsf(particles->pressure[i] - still) < SHARE * still))
+        particles->pressure[i] = still;
+    particles->pressure_divergence[i] = 0.0f;
 }
 
 void edge_advance(SkiffSim *sim, uint32_t i) {
@@ -93,24 +101,39 @@ static bool move_water(SkiffSim *sim, const EdgePlace *place, Err *err) {
     for (int k = 0; k < 3; k++)
         sim->origin[k] += (double)place->shift[k];
     ghosts_shift(&sim->ghosts, place->shift);
-    if (!measure_distances(sim, err) || !ghosts_reserve(&sim->ghosts, n, sim->time, err))
+    if (!measure_distances(sim, err))
         return false;
-    const float *distance = sim->sea.distance_buffer.data;
+    float *distance = sim->sea.distance_buffer.data;
     uint32_t kept = 0, *order = sim->rest.source.data;
+    for (uint32_t i = 0; i < n; i++)
+        kept += distance[i] < place->support;
+    if (!ghosts_reserve(&sim->ghosts, n - kept, sim->time, err))
+        return false;
+    kept = 0;
     for (uint32_t i = 0; i < n; i++) {
         if (distance[i] >= place->support) {
             ghosts_add(&sim->ghosts, particles, i, sim->time);
             continue;
         }
-        order[kept++] = i;
-        if (distance[i] < 0.0f)
-            particles->edge[i] = EDGE_NONE;
-        else if (particles->edge[i] == EDGE_NONE)
+        if (distance[i] >= 0.0f && particles->edge[i] == EDGE_NONE)
             catch_particle(sim, i);
+        distance[kept] = distance[i];
+        order[kept++] = i;
     }
     sim->stats.particles_out[SKIFF_OUT_WINDOW] += n - kept;
     particles_permute(particles, order, kept, sim->threads);
     return true;
+}
+
+/* After move_water, and when nobody needs to know any more who was edge. */
+static void set_free(SkiffSim *sim, uint32_t count) {
+    const float *distance = sim->sea.distance_buffer.data;
+    Particles *particles = &sim->particles;
+    for (uint32_t i = 0; i < count; i++)
+        if (distance[i] < 0.0f && particles->edge[i] != EDGE_NONE) {
+            particles->edge[i] = EDGE_NONE;
+            particles->prediction[i] = -1.0f;
+        }
 }
 
 /* ---- What comes ---- */
@@ -138,7 +161,8 @@ static bool sort_rim(SkiffSim *sim, EdgePlace *place, Err *err) {
     memset(start, 0, (cells + 2) * sizeof(uint32_t));
     for (uint32_t i = 0; i < particles->count; i++) {
         const float *p = particles->position[i];
-        if (distance_before(place, p) < place->support - RIM * place->radius)
+        if (particles->edge[i] == EDGE_NONE ||
+            distance_before(place, p) < place->support - RIM * place->radius)
             continue;
         start[grid_cell_of(grid, p) + 2]++;
         found[count++] = i;
@@ -186,9 +210,8 @@ static float outside_ring(const void *user, const float p[3]) {
 }
 
 static bool gather(SkiffSim *sim, const EdgePlace *place, Err *err) {
-    WaterPlace part = {.surface = (float)(sim->sea.level - sim->origin[1]),
-                       .outside = outside_ring,
-                       .user = place};
+    WaterPlace part = {
+        .surface = (float)(sim->sea.level - sim->origin[1]), .outside = outside_ring, .user = place};
     memcpy(part.origin, sim->origin, sizeof part.origin);
     for (int k = 0; k < 3; k++) {
         part.bounds.min[k] = sim->tank.min[k] - place->support;
@@ -256,8 +279,7 @@ static bool append_laid(SkiffSim *sim, Err *err) {
     if (!sim_reserve(sim, first + laid->count, err))
         return false;
     for (uint32_t i = 0; i < laid->count; i++) {
-        const uint32_t to =
-            particles_append(particles, laid->position[i], (const float[3]){0}, sim->time);
+        const uint32_t to = particles_append(particles, laid->position[i], (const float[3]){0}, sim->time);
         particles->pressure[to] = laid->pressure[i][0];
         particles->pressure_divergence[to] = laid->pressure[i][1];
     }
@@ -285,8 +307,7 @@ static bool lay_water(SkiffSim *sim, const EdgePlace *place, Err *err) {
 }
 
 static EdgePlace edge_place(const SkiffSim *sim) {
-    return (EdgePlace){
-        .sim = sim, .support = sim->kernel.support, .radius = sim->params.particle_radius};
+    return (EdgePlace){.sim = sim, .support = sim->kernel.support, .radius = sim->params.particle_radius};
 }
 
 bool edge_gather_all(SkiffSim *sim, Err *err) {
@@ -301,6 +322,7 @@ bool edge_move(SkiffSim *sim, const float shift[3], Err *err) {
     if (!move_water(sim, &place, err) || !sort_rim(sim, &place, err) || !gather(sim, &place, err))
         return false;
     drop_taken(&place, &sim->sea.laid.water);
+    set_free(sim, sim->particles.count);
     if (!boundary_place(&sim->boundary, sim->bodies, sim->body_count, sim->origin, place.support,
                         sim->threads, err) ||
         !lay_water(sim, &place, err))

@@ -65,11 +65,13 @@ typedef struct RestCloud {
     Boundary boundary; /* the simulation's samples with contacts of the cloud's own */
     Dfsph dfsph;
     bool fits_walls;     /* the points fit the walls: these make no candidates and remove nothing */
+    bool has_existing;   /* existing water is among the points */
     float counted_below; /* y: candidates above lack neighbours and do not count in the mean density */
-    Buffer marks, laid, source, fate; /* rest_gather.c */
-    Buffer frozen, held;              /* [points] 1: gets no row; gets one but does not move */
+    Buffer marks, clearance, laid, source, fate; /* rest_gather.c */
+    Buffer frozen, held;                         /* [points] 1: gets no row; gets one but does not move */
     Buffer state, constant, walls, sum, density, order; /* rest_select.c */
     Buffer kept[PARTICLE_FIELD_COUNT + 1];              /* existing water as it was, and its densities */
+    Buffer whence[2];                                   /* where existing water stands in `kept` */
 } RestCloud;
 
 /* Fills and appends the new particles to the simulation's. False: no memory, or the water is too dense
@@ -77,12 +79,16 @@ typedef struct RestCloud {
 bool rest_fill(struct SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err);
 void rest_cloud_free(RestCloud *cloud);
 
+/* Loads the tile of water at rest unless it is there; false when it is not made for the scene's volumeFactor.
+ */
+bool rest_check_tile(struct SkiffSim *sim, Err *err);
+
 /* The stages of rest_fill. */
 bool rest_gather(struct SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err);
 bool rest_select(struct SkiffSim *sim, SkiffFill *fill, Err *err);
 bool rest_settle(struct SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err);
-/* The simulation's particles are a column of water, x and z in [0, period), that goes on periodically: all but
- * the edge settles. */
+/* The simulation's particles are a column of water, x and z in [0, period), that goes on periodically: all
+ * but the edge settles. */
 bool rest_settle_column(struct SkiffSim *sim, double period, SkiffFill *fill, Err *err);
 /* Sorts the cloud, freezes what is of no kind in `evaluated` (bits 1 << RestKind), and makes rows and
  * boundary terms of the rest. */

@@ -25,6 +25,9 @@
 static const double FIRST_ALPHA = 0.8, LAST_ALPHA = 0.1;
 /* Longest step, r / sqrt(p / rho0): beyond 1.5 it is unstable, whatever depth and radius. */
 static const float LONGEST = 1.35f;
+/* The solves stop at 0.4 of a tolerance, so that the error found in the next step keeps it. In a layer that
+ * is let go only after more steps, or as the paper does it, the tolerance itself is enough. */
+static const float LAYER_ERRORS = 2.5f;
 /* Of a density error of held water, the share that a step turns into pressure: with 1 its pressures swing. */
 static const float HELD_SHARE = 0.15f;
 /* Of what two particles lack to the distance of a radius, the share that each moves a step. */
@@ -48,6 +51,8 @@ typedef struct Settle {
     const uint8_t *held;   /* [particles] 1: does not move; or NULL */
     uint32_t active;
     int steps;     /* at most */
+    bool yields;   /* existing water beside the new moves too */
+    bool tracks;   /* where existing water was before the sorts: RestCloud.whence */
     float surface; /* y, m */
     double period; /* of a column, m */
 } Settle;
@@ -193,15 +198,51 @@ static bool search_cloud(Settle *settle, uint64_t first_id, Err *err) {
     return rest_search(settle->sim, 1u << REST_ACTIVE, err);
 }
 
+static bool beside_moving(const Settle *settle, const uint8_t *held, uint32_t i) {
+    RestNeighbour row[MAX_NEIGHBOURS];
+    const int length = rest_row(&settle->rows->pairs, i, row);
+    for (int k = 0; k < length; k++)
+        if (!held[row[k].index])
+            return true;
+    return false;
+}
+
+/* Lets go what stands beside what moves: wider[i] is held[i] without it. */
+static void let_go(const Settle *settle, const uint8_t *held, uint8_t *wider) {
+#pragma omp parallel for schedule(static, BLOCK) num_threads(settle->sim->threads)
+    for (uint32_t i = 0; i < settle->particles->count; i++)
+        wider[i] = held[i] && !beside_moving(settle, held, i);
+}
+
+static void track_existing(Settle *settle) {
+    RestCloud *cloud = &settle->sim->rest;
+    const uint32_t *from = cloud->whence[0].data, *order = settle->grid->order;
+    uint32_t *to = cloud->whence[1].data;
+    for (uint32_t i = 0; i < settle->particles->count; i++)
+        to[i] = from[order[i]];
+    const Buffer swap = cloud->whence[0];
+    cloud->whence[0] = cloud->whence[1];
+    cloud->whence[1] = swap;
+}
+
 static bool search_all(Settle *settle, uint64_t first_id, Err *err) {
     if (!settle_sort(settle, err))
         return false;
     const Particles *particles = settle->particles;
-    uint8_t *held = settle->sim->rest.held.data;
     settle->frozen = particles->edge;
+    if (!settle_rows(settle, err))
+        return false;
+    if (settle->tracks)
+        track_existing(settle);
+    RestCloud *cloud = &settle->sim->rest;
+    uint8_t *held = cloud->held.data, *wider = cloud->frozen.data;
     for (uint32_t i = 0; i < particles->count; i++)
         held[i] = particles->id[i] < first_id || particles->edge[i] != EDGE_NONE;
-    return settle_rows(settle, err);
+    if (settle->yields && settle->tracks) {
+        let_go(settle, held, wider);
+        let_go(settle, wider, held);
+    }
+    return true;
 }
 
 /* Drops the last step's copies of the column and wraps what has moved out of it. */
@@ -248,15 +289,6 @@ static bool search_column(Settle *settle, uint64_t first_id, Err *err) {
     return search_all(settle, first_id, err);
 }
 
-static bool beside_moving(const Settle *settle, uint32_t i) {
-    RestNeighbour row[MAX_NEIGHBOURS];
-    const int length = rest_row(&settle->rows->pairs, i, row);
-    for (int k = 0; k < length; k++)
-        if (!settle->held[row[k].index])
-            return true;
-    return false;
-}
-
 /* What is held beside the new water: where it is too dense it presses more, and less where it is too thin, so
  * that the new water comes to rest where both are at rest. */
 static void correct_held(Settle *settle) {
@@ -265,7 +297,7 @@ static void correct_held(Settle *settle) {
 #pragma omp parallel for schedule(static, BLOCK) num_threads(settle->sim->threads)
     for (uint32_t i = 0; i < particles->count; i++) {
         const bool has_row = settle->frozen == NULL || !settle->frozen[i];
-        if (!settle->held[i] || !has_row || !beside_moving(settle, i))
+        if (!settle->held[i] || !has_row || !beside_moving(settle, settle->held, i))
             continue;
         const float diagonal = fmaxf(pairs->gradient_sum[i][3], 1.0f);
         const float next = particles->pressure[i] + HELD_SHARE * (pairs->density[i] - 1.0f) / diagonal;
@@ -303,10 +335,16 @@ static void part_pairs(const Settle *settle) {
 }
 
 static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, SkiffFill *fill, Err *err) {
+    if (settle->steps == 0)
+        return true;
+    const SkiffParams given = settle->params;
     SkiffParams *params = &settle->params;
     const double unit = (double)(params->particle_radius / params->time_step);
     const float scale = step_scale(settle);
-    params->max_density_error = params->rest_density_error;
+    const bool layer = settle->particles == &settle->sim->rest.points;
+    const float errors = layer ? LAYER_ERRORS : 1.0f;
+    params->max_density_error = errors * params->rest_density_error;
+    params->max_divergence_error *= errors;
     params->softening = params->rest_softening;
     params->feedforward = 0.0f;
     params->time_step *= scale;
@@ -340,6 +378,7 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
         move_active(settle, kept_share(params, step));
     }
     scale_pressures(settle->particles, 1.0f / (scale * scale));
+    settle->params = given;
     return true;
 }
 
@@ -393,6 +432,30 @@ bool rest_settle(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err
            run_steps(&settle, search_cloud, 0, fill, err);
 }
 
+/* Existing water stands still while what is beside it settles, and then goes on as it went. */
+static bool stop_existing(SkiffSim *sim, uint64_t first_id, Err *err) {
+    RestCloud *cloud = &sim->rest;
+    for (int k = 0; k < 2; k++)
+        if (!buffer_reserve(&cloud->whence[k], "order of existing water",
+                            sim->particles.capacity * sizeof(uint32_t), err))
+            return false;
+    uint32_t *whence = cloud->whence[0].data;
+    for (uint32_t i = 0; i < sim->particles.count; i++) {
+        whence[i] = i;
+        if (sim->particles.id[i] < first_id)
+            memset(sim->particles.velocity[i], 0, sizeof(Float4));
+    }
+    return true;
+}
+
+static void restart_existing(SkiffSim *sim, uint64_t first_id) {
+    const Float4 *velocity = sim->rest.kept[PARTICLE_velocity].data;
+    const uint32_t *whence = sim->rest.whence[0].data;
+    for (uint32_t i = 0; i < sim->particles.count; i++)
+        if (sim->particles.id[i] < first_id)
+            memcpy(sim->particles.velocity[i], velocity[whence[i]], sizeof(Float4));
+}
+
 static uint32_t count_edge(const Particles *particles) {
     uint32_t count = 0;
     for (uint32_t i = 0; i < particles->count; i++)
@@ -424,20 +487,27 @@ bool rest_settle_column(SkiffSim *sim, double period, SkiffFill *fill, Err *err)
 /* All of the simulation's particles with ids from `first_id` on; all others, and the edge, are held. */
 static bool settle_water(SkiffSim *sim, float surface, uint64_t first_id, SkiffFill *fill, Err *err) {
     const SkiffParams *params = &sim->params;
-    const bool second = fill->steps > 0; /* shell: after the layer */
-    const int steps = second ? params->rest_final_steps : params->rest_steps;
+    const bool layer_done = fill->steps > 0;
     fill->active = fill->particles - count_edge(&sim->particles);
-    if (fill->active == 0 || steps == 0)
+    if (fill->active == 0)
         return true;
     still_existing(sim);
-    if (!buffer_reserve(&sim->rest.held, "held particles", sim->particles.capacity + SLICE, err))
+    if (!buffer_reserve(&sim->rest.held, "held particles", sim->particles.capacity + SLICE, err) ||
+        !buffer_reserve(&sim->rest.frozen, "held particles", sim->particles.capacity + SLICE, err))
         return false;
     const bool nothing_else = fill->active == sim->particles.count;
     memset(sim->rest.held.data, 0, sim->particles.capacity + SLICE);
     Settle settle = settle_all(sim, surface, fill->active);
     settle.held = nothing_else ? NULL : sim->rest.held.data;
-    settle.steps = steps;
-    const bool good = run_steps(&settle, search_all, first_id, fill, err);
+    settle.tracks = sim->particles.count > fill->particles;
+    settle.steps = layer_done ? 0 : params->rest_steps;
+    bool good = (!settle.tracks || stop_existing(sim, first_id, err)) &&
+                run_steps(&settle, search_all, first_id, fill, err);
+    settle.steps = params->rest_final_steps;
+    settle.yields = params->rest_settle == REST_SETTLE_SHELL;
+    good = good && run_steps(&settle, search_all, first_id, fill, err);
+    if (good && settle.tracks)
+        restart_existing(sim, first_id);
     for (uint32_t i = 0; i < sim->particles.count; i++)
         if (sim->particles.id[i] >= first_id)
             memset(sim->particles.velocity[i], 0, sizeof(Float4));
@@ -486,7 +556,7 @@ static void show(SkiffSim *sim, uint64_t first_id, bool all) {
     sim_add_pressures(sim);
 }
 
-static bool check_tile(SkiffSim *sim, Err *err) {
+bool rest_check_tile(SkiffSim *sim, Err *err) {
     if (sim->tile.count == 0 && !tile_load_default(&sim->tile, err))
         return false;
     const double own = (double)sim->params.volume_factor, needed = sim->tile.volume_factor;
@@ -503,7 +573,8 @@ bool rest_fill(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *
     const uint32_t count = sim->particles.count;
     const bool all = sim->params.rest_settle != REST_SETTLE_CANDIDATES;
     const double start = timer_ms();
-    if ((request->fitted == NULL && !check_tile(sim, err)) || (all && count > 0 && !keep_existing(sim, err)))
+    if ((request->fitted == NULL && !rest_check_tile(sim, err)) ||
+        (all && count > 0 && !keep_existing(sim, err)))
         return false;
     bool good = rest_gather(sim, request, fill, err);
     const double gathered = timer_ms();
@@ -535,9 +606,10 @@ void rest_cloud_free(RestCloud *cloud) {
     cloud->boundary.fixed = cloud->boundary.moving = (BoundarySet){0};
     boundary_free(&cloud->boundary);
     dfsph_free(&cloud->dfsph);
-    Buffer *buffers[] = {&cloud->marks,  &cloud->laid, &cloud->source,  &cloud->fate,
-                         &cloud->frozen, &cloud->held, &cloud->state,   &cloud->constant,
-                         &cloud->walls,  &cloud->sum,  &cloud->density, &cloud->order};
+    Buffer *buffers[] = {&cloud->marks,    &cloud->clearance, &cloud->laid,     &cloud->source,
+                         &cloud->fate,     &cloud->frozen,    &cloud->held,     &cloud->state,
+                         &cloud->constant, &cloud->walls,     &cloud->sum,      &cloud->density,
+                         &cloud->order,    &cloud->whence[0], &cloud->whence[1]};
     for (size_t b = 0; b < sizeof buffers / sizeof *buffers; b++)
         buffer_free(buffers[b]);
     for (int f = 0; f <= PARTICLE_FIELD_COUNT; f++)

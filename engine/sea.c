@@ -184,6 +184,11 @@ static bool check_def(SkiffSim *sim, const SkiffDef *def, Err *err) {
             sim->sea.follow = b;
     if (sea->follow != NULL && sim->sea.follow < 0)
         good = err_add(err, ERR_INPUT, "Sea.follow: there is no body '%s'", sea->follow);
+    sim->sea.level = (double)sea->level;
+    const float beyond = sim->sea.follow >= 0 ? window_followed_distance(sim) : -1.0f;
+    if (beyond >= 0.0f)
+        good = err_add(err, ERR_INPUT, "Sea.follow: body '%s' starts outside the window, by %.3g m",
+                       sea->follow, (double)beyond);
     for (int k = 0; k < sea->path_count; k++) {
         const double *p = sea->path[k];
         if (!isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2]) || (k > 0 && p[0] <= sea->path[k - 1][0]))
@@ -201,7 +206,6 @@ static bool check_def(SkiffSim *sim, const SkiffDef *def, Err *err) {
 static bool take_def(SkiffSim *sim, const SkiffDef *def, Err *err) {
     Sea *sea = &sim->sea;
     sea->on = true;
-    sea->level = (double)def->sea.level;
     sea->absorbs = def->sea.absorb;
     sea->water_edge = sea_has_water_edge(def);
     sea->has_region = def->sea.has_region;
@@ -259,7 +263,7 @@ static bool fill_first(SkiffSim *sim, Err *err) {
 bool sea_make(SkiffSim *sim, const SkiffDef *def, Err *err) {
     if (!def->sea.on)
         return true;
-    if (!check_def(sim, def, err) || !take_def(sim, def, err) || !tile_load_default(&sim->tile, err))
+    if (!check_def(sim, def, err) || !take_def(sim, def, err) || !rest_check_tile(sim, err))
         return false;
     if (def->sea.dry)
         return true;

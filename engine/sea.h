@@ -24,10 +24,10 @@ typedef struct Sea {
     Buffer fitted_buffer, ring_buffer;
     /* with an edge of water */
     StillWater water;
-    WaterList laid; /* of the last move */
+    WaterList laid;              /* of the last move */
     Buffer rim_start, rim_index; /* edge.c */
-    Float4 *inlets;        /* points where water may come in; [3]: density the walls give there */
-    Float4 *inlet_normals; /* horizontal, unit, into the window */
+    Float4 *inlets;              /* points where water may come in; [3]: density the walls give there */
+    Float4 *inlet_normals;       /* horizontal, unit, into the window */
     float (*inlet_pressure)[2];
     uint32_t inlet_count;
     Buffer inlet_buffer, distance_buffer, flow_buffer;
@@ -43,6 +43,9 @@ bool sea_has_water_edge(const SkiffDef *def);
 
 /* Moves the window when what it follows has gone too far. */
 bool window_follow(struct SkiffSim *sim, Err *err);
+/* Of the body that is followed: signed distance from the edge, m, negative inside. */
+float window_followed_distance(const struct SkiffSim *sim);
+
 /* The edge as water (edge.c). Signed distance from it, m, negative inside; over the surface it goes straight
  * up. */
 float edge_distance(const struct SkiffSim *sim, const float p[3], float gradient[3]);

@@ -177,7 +177,9 @@ typedef struct SkiffProbeDef {
 } SkiffProbeDef;
 
 /* A sea without end around the tank [Carensac2023 sec. 4]: the tank is filled to `level` with water at rest,
- * becomes the window that follows a body, and waves die at its walls. */
+ * becomes the window that follows a body, and waves die at its edge. One that moves has no walls unless
+ * windowEdge says so: the world's water at rest stands around it, one support wide, as particles that are
+ * part of the simulation's. */
 typedef struct SkiffSeaDef {
     bool on;
     float level;        /* y of the still surface, m */

@@ -42,8 +42,7 @@ SkiffTile *skiff_tile_surface(int threads, Err *err) {
     RestTile surface;
     def.threads = threads;
     SkiffSim *sim = skiff_create(&def, err);
-    const bool good =
-        sim && tile_load_default(&sim->tile, err) && water_make_surface(sim, &surface, err);
+    const bool good = sim && tile_load_default(&sim->tile, err) && water_make_surface(sim, &surface, err);
     skiff_destroy(sim);
     return good ? own(&surface, err) : NULL;
 }

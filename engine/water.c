@@ -177,10 +177,9 @@ bool water_make_surface(SkiffSim *sim, RestTile *surface, Err *err) {
     Column column;
     SkiffFill fill = {0};
     *surface = (RestTile){0};
-    const bool good =
-        lay_column(sim, period, (WATER_SETTLED + 1) * sim->kernel.support, &column, err) &&
-        place_surface(sim, &column, err) && rest_settle_column(sim, period, &fill, err) &&
-        take_surface(sim, period, surface, err);
+    const bool good = lay_column(sim, period, (WATER_SETTLED + 1) * sim->kernel.support, &column, err) &&
+                      place_surface(sim, &column, err) && rest_settle_column(sim, period, &fill, err) &&
+                      take_surface(sim, period, surface, err);
     sim->particles.count = 0;
     sim->particles.next_id = 0;
     return good;
@@ -201,8 +200,8 @@ static bool add_cell(const StillWater *water, const WaterPlace *place, const dou
 }
 
 /* All cells over one square of the world. */
-static bool add_square(const StillWater *water, const WaterPlace *place, const int64_t square[2], WaterList *list,
-                       Err *err) {
+static bool add_square(const StillWater *water, const WaterPlace *place, const int64_t square[2],
+                       WaterList *list, Err *err) {
     /* a little more than half the diagonal: points lie in their cells but for rounding */
     const float reach = 0.87f * water->cell;
     double corner[2];

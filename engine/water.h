@@ -1,6 +1,7 @@
 /* The world's water at rest: what lies where nothing has been yet. A column of it, the tile under a surface
- * that has settled on it, repeats along x and z with the period of the tile. It is anchored in the world: whatever window
- * looks at a place finds the same particles there, and where two looks meet there is no seam. */
+ * that has settled on it, repeats along x and z with the period of the tile. It is anchored in the world:
+ * whatever window looks at a place finds the same particles there, and where two looks meet there is no seam.
+ */
 #ifndef SKIFF_WATER_H
 #define SKIFF_WATER_H
 
@@ -38,8 +39,9 @@ typedef struct WaterList {
 /* Makes a column that reaches `depth` (m) down at least. The simulation has its tile and params. */
 bool water_make(StillWater *water, struct SkiffSim *sim, float depth, Err *err);
 /* Lets the tile's upper part settle under a free surface, as a block, the level WATER_SETTLED
- * supports and a radius over its bottom, shares relative to a depth of a radius at least. It is at rest at every scale, and
- * comes with the program. The simulation has its tile and no particles; it is left as it was. */
+ * supports and a radius over its bottom, shares relative to a depth of a radius at least. It is at rest at
+ * every scale, and comes with the program. The simulation has its tile and no particles; it is left as it
+ * was. */
 bool water_make_surface(struct SkiffSim *sim, RestTile *surface, Err *err);
 /* Replaces the list by the particles of a place, always in the same order. */
 bool water_gather(const StillWater *water, const WaterPlace *place, WaterList *list, Err *err);

@@ -1,11 +1,14 @@
-/* A kilometre in one run: nothing may creep. The boat of assets/meshes under heading hold, coarse particles.
+/* A kilometre in one run: nothing may creep. The boat of assets/meshes in twice its size, under heading hold,
+ * so that coarse particles still drag on it.
  *
- * The same again with another number of threads must end in the same bits; started 100 km from the origin it
- * must give the same statistics. A trend is the slope of a straight line fitted over the run but for its
- * first 100 m, times its length. */
+ * The same again with another number of threads must be in the same bits after a fifth of the way; started
+ * 100 km from the origin it must give the same statistics over half of it. A trend is the slope of a straight
+ * line fitted over the run but for its first 100 m, times its length. */
 #include "experiment.h"
 
-static const double radius_default = 0.15, distance = 1000.0, warm_up = 100.0; /* m */
+static const double radius_default = 0.2, distance = 1000.0, warm_up = 100.0; /* m */
+static const double hash_after = 200.0;                                       /* m */
+static const double scale = 2.0, thrust = 20000.0, level = 2.0;               /* N, m */
 
 typedef enum Quantity { LEVEL, COUNT, SPEED, ITERATIONS, STEP_MS, QUANTITY_COUNT } Quantity;
 static const char *const names[QUANTITY_COUNT] = {"level", "particles", "speed", "iterations", "step time"};
@@ -20,7 +23,7 @@ typedef struct Haul {
     double mean[QUANTITY_COUNT], change[QUANTITY_COUNT]; /* change along the run by the fitted line */
     double distance, wall;                               /* m, s */
     double moves;
-    uint64_t hash;
+    uint64_t hash; /* after hash_after */
 } Haul;
 
 static SkiffSim *make(const Experiment *experiment, int threads, double start) {
@@ -32,20 +35,24 @@ static SkiffSim *make(const Experiment *experiment, int threads, double start) {
     def.params.boundary_offset = 1.15f;
     def.params.escape = 1;
     def.tank.geometry.kind = SKIFF_GEOMETRY_CYLINDER;
-    def.tank.geometry.radius = 4.0f;
-    def.tank.geometry.height = 4.0f;
+    def.tank.geometry.radius = 6.0f;
+    def.tank.geometry.height = 5.0f;
     def.tank.geometry.translation[0] = (float)start;
-    def.tank.geometry.translation[1] = 2.0f;
-    def.tank.wet_height = 3.0f;
-    def.sea = (SkiffSeaDef){.on = true, .level = 1.5f, .follow = "boat", .absorb = true};
-    SkiffDriveDef drive = skiff_drive_default(); /* 5000 N */
+    def.tank.geometry.translation[1] = 2.5f;
+    def.tank.wet_height = 3.5f;
+    def.sea = (SkiffSeaDef){.on = true, .level = (float)level, .follow = "boat", .absorb = true};
+    SkiffDriveDef drive = skiff_drive_default();
+    drive.thrust = (float)thrust;
+    drive.steering_torque = (float)(400.0 * pow(scale, 4));
     SkiffBodyDef boat = skiff_body_default();
     boat.name = "boat";
     boat.geometry.kind = SKIFF_GEOMETRY_MESH;
     boat.geometry.file = SKIFF_SOURCE_DIR "/assets/meshes/boat.obj";
     boat.geometry.translation[0] = (float)start;
-    boat.geometry.translation[1] = 1.5f;
-    boat.mass = 1480.0f;
+    boat.geometry.translation[1] = (float)level;
+    for (int k = 0; k < 3; k++)
+        boat.geometry.scale[k] = (float)scale;
+    boat.mass = (float)(1480.0 * pow(scale, 3));
     boat.drive = &drive;
     def.bodies = &boat;
     def.body_count = 1;
@@ -72,7 +79,7 @@ static void add_step(const SkiffSim *sim, double way, Line *lines, FileWriter *s
                                            [ITERATIONS] =
                                                stats->density_iterations + stats->divergence_iterations,
                                            [STEP_MS] = stats->step_ms};
-    if (series && stats->step % 50 == 0) {
+    if (series && stats->step % 20 == 0) {
         fprintf(series->stream, "%.6g", way);
         for (int q = 0; q < QUANTITY_COUNT; q++)
             fprintf(series->stream, ",%.6g", values[q]);
@@ -82,17 +89,19 @@ static void add_step(const SkiffSim *sim, double way, Line *lines, FileWriter *s
         add(&lines[q], way, values[q]);
 }
 
-static Haul haul(const Experiment *experiment, int threads, double start, FileWriter *series) {
+static Haul haul(const Experiment *experiment, int threads, double start, double way, FileWriter *series) {
     SkiffSim *sim = make(experiment, threads, start);
     Line lines[QUANTITY_COUNT] = {0};
     Haul result = {.wall = experiment_clock()};
     double last[2] = {start, 0.0};
-    while (result.distance < distance) {
+    while (result.distance < way) {
         experiment_step(sim);
         const SkiffBody boat = skiff_body(sim, 0);
         result.distance += hypot(boat.position[0] - last[0], boat.position[2] - last[1]);
         last[0] = boat.position[0];
         last[1] = boat.position[2];
+        if (result.hash == 0 && result.distance >= hash_after)
+            result.hash = skiff_hash(sim);
         add_step(sim, result.distance, lines, series);
         if (skiff_time(sim) > 2000.0)
             break;
@@ -107,7 +116,6 @@ static Haul haul(const Experiment *experiment, int threads, double start, FileWr
     SkiffWindow window = {0};
     skiff_window(sim, &window);
     result.moves = (double)window.moves;
-    result.hash = skiff_hash(sim);
     result.wall = experiment_clock() - result.wall;
     skiff_destroy(sim);
     return result;
@@ -123,10 +131,10 @@ static double allowed(const Experiment *experiment, Quantity quantity, double me
 int main(int argc, char **argv) {
     Experiment experiment = experiment_begin_sized("long_haul", radius_default, argc, argv);
     FileWriter series = experiment_series(&experiment, "series", "way,level,particles,speed,iterations,ms");
-    const Haul near = haul(&experiment, experiment.threads, 0.0, &series);
+    const Haul near = haul(&experiment, experiment.threads, 0.0, distance, &series);
     experiment_close(&series);
-    const Haul again = haul(&experiment, experiment.threads == 1 ? 2 : 1, 0.0, NULL);
-    const Haul far = haul(&experiment, experiment.threads, 1e5, NULL);
+    const Haul again = haul(&experiment, experiment.threads == 1 ? 2 : 1, 0.0, hash_after, NULL);
+    const Haul far = haul(&experiment, experiment.threads, 1e5, 0.5 * distance, NULL);
     experiment_check(&experiment, "way sailed", near.distance, distance, 1.0, "m");
     experiment_note(&experiment, "window moves", near.moves, "");
     experiment_note(&experiment, "wall time of a run", near.wall, "s");

@@ -1,5 +1,5 @@
-/* A window that moves gives the same state whatever computes it, also after a save and resume, and keeps its
- * water.
+/* A window that moves, with an edge of water or of walls, gives the same state whatever computes it, also
+ * after a save and resume, and keeps its water.
  *
  * Scene: a small star-shaped window over 0.4 m of still water follows a floating crate that is pulled, 120
  * steps with several moves, absorption on. */
@@ -9,7 +9,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 
-#include "skiff.h"
+#include "engine/sim.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -32,12 +32,13 @@ static SkiffBodyDef fixed_box(const char *name, const float size[3], float x, fl
     return box;
 }
 
-static SkiffSim *make_sea(int threads, SkiffSimd simd, double start, bool has_fixed) {
+static SkiffSim *make_sea(int threads, SkiffSimd simd, double start, bool has_fixed, int edge) {
     static const double pull = 2.6; /* m/s */
     SkiffDef def = skiff_def_default();
     Err err = {0};
     def.threads = threads;
     def.simd = simd;
+    def.params.window_edge = edge;
     def.params.particle_radius = 0.04f;
     def.params.time_step = 0.005f;
     def.params.sea_steps = 10;
@@ -73,7 +74,7 @@ static SkiffSim *make_sea(int threads, SkiffSimd simd, double start, bool has_fi
 }
 
 static SkiffSim *make(int threads, SkiffSimd simd, double start) {
-    return make_sea(threads, simd, start, false);
+    return make_sea(threads, simd, start, false, WINDOW_EDGE_WATER);
 }
 
 static void run(SkiffSim *sim, int steps) {
@@ -83,8 +84,8 @@ static void run(SkiffSim *sim, int steps) {
             fail_msg("%s", err.message);
 }
 
-static uint64_t hash_of(int threads, SkiffSimd simd) {
-    SkiffSim *sim = make(threads, simd, 0.0);
+static uint64_t hash_of(int threads, SkiffSimd simd, int edge) {
+    SkiffSim *sim = make_sea(threads, simd, 0.0, false, edge);
     run(sim, STEPS);
     SkiffWindow window;
     assert_true(skiff_window(sim, &window));
@@ -96,9 +97,11 @@ static uint64_t hash_of(int threads, SkiffSimd simd) {
 
 static void test_threads_and_instruction_sets(void **state) {
     (void)state;
-    const uint64_t expected = hash_of(1, SKIFF_SIMD_PLAIN);
+    const uint64_t expected = hash_of(1, SKIFF_SIMD_PLAIN, WINDOW_EDGE_WATER);
     for (int threads = 2; threads <= 3; threads++)
-        assert_int_equal(hash_of(threads, SKIFF_SIMD_AUTO), expected);
+        assert_int_equal(hash_of(threads, SKIFF_SIMD_AUTO, WINDOW_EDGE_WATER), expected);
+    assert_int_equal(hash_of(3, SKIFF_SIMD_AUTO, WINDOW_EDGE_WALLS),
+                     hash_of(1, SKIFF_SIMD_PLAIN, WINDOW_EDGE_WALLS));
 }
 
 static void test_save_and_resume(void **state) {
@@ -162,7 +165,7 @@ static void test_far_away(void **state) {
  * and leaves behind, one is so far that cells over both would not fit into memory. */
 static void test_fixed_bodies(void **state) {
     (void)state;
-    SkiffSim *sim = make_sea(2, SKIFF_SIMD_AUTO, 0.0, true);
+    SkiffSim *sim = make_sea(2, SKIFF_SIMD_AUTO, 0.0, true, WINDOW_EDGE_WATER);
     const SkiffBody pillar = skiff_body(sim, 1);
     double deepest = -INFINITY, force = 0.0;
     for (int k = 0; k < 3 * STEPS; k++) {
