@@ -173,7 +173,7 @@ static inline Vf adjugate(const Vf m[6], Vf adjugate[6]) {
 /* Where neighbours are few, or lie in a plane, B fades to the identity: the determinant of the moments is 1
  * inside water, about 1/2 at a flat surface. */
 static void shape(const CorrectionJob *job, uint32_t block) {
-    static const float NO_CORRECTION = 0.1f, FULL_CORRECTION = 0.4f, LEAST_DENSITY = 0.8f;
+    static const float NO_CORRECTION = 0.35f, FULL_CORRECTION = 0.65f, LEAST_DENSITY = 0.8f;
     const PairData *pairs = job->pairs;
     const Vf one = vf_set(1.0f);
     for (uint32_t slice = block * BLOCK_SLICES; slice < (block + 1) * BLOCK_SLICES; slice++) {
