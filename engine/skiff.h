@@ -368,7 +368,7 @@ typedef struct SkiffStats {
     double time, dt; /* s, at the end of the step */
     uint32_t particles, boundary_samples, contacts;
     uint32_t particles_in[SKIFF_IN_COUNT], particles_out[SKIFF_OUT_COUNT]; /* during the step, by cause */
-    bool moved; /* the window moved in this step */
+    bool moved;                                                            /* the window moved in this step */
     int density_iterations, divergence_iterations;
     double density_error_percent; /* mean over all particles of max(0, rho/rho0 - 1), found at the start of
                                      the step: what the last one left */
