@@ -11,6 +11,8 @@
 
 /* Caught water goes on for a while, so that the water behind it need not stop at once; s. */
 static const float CATCH_TIME = 0.05f;
+/* By as much of its share pressures at rest may differ from that of still water: three times their spread. */
+static const float SHARE = 0.25f;
 /* Where the edge ends rounding decides who belongs to it: the same particle is closer than this, r. */
 static const float SAME = 0.5f;
 /* Laid water comes no closer than this to caught water, r: at rest the particles of the surface come as close
@@ -66,10 +68,15 @@ static float still_pressure(const SkiffSim *sim, const float p[3]) {
     return fmaxf(-params->gravity[1] * depth * params->time_step * params->time_step, 0.0f);
 }
 
+/* Water at rest keeps the pressure that balances it; that of moving water is one step's, and gives way to
+ * what still water has. */
 static void catch_particle(SkiffSim *sim, uint32_t i) {
-    sim->particles.edge[i] = EDGE_CAUGHT;
-    sim->particles.pressure[i] = still_pressure(sim, sim->particles.position[i]);
-    sim->particles.pressure_divergence[i] = 0.0f;
+    Particles *particles = &sim->particles;
+    const float still = still_pressure(sim, particles->position[i]);
+    particles->edge[i] = EDGE_CAUGHT;
+    if (!(fabsf(particles->pressure[i] - still) < SHARE * still))
+        particles->pressure[i] = still;
+    particles->pressure_divergence[i] = 0.0f;
 }
 
 void edge_advance(SkiffSim *sim, uint32_t i) {
@@ -121,9 +128,12 @@ static bool move_water(SkiffSim *sim, const EdgePlace *place, Err *err) {
 /* After move_water, and when nobody needs to know any more who was edge. */
 static void set_free(SkiffSim *sim, uint32_t count) {
     const float *distance = sim->sea.distance_buffer.data;
+    Particles *particles = &sim->particles;
     for (uint32_t i = 0; i < count; i++)
-        if (distance[i] < 0.0f)
-            sim->particles.edge[i] = EDGE_NONE;
+        if (distance[i] < 0.0f && particles->edge[i] != EDGE_NONE) {
+            particles->edge[i] = EDGE_NONE;
+            particles->prediction[i] = -1.0f;
+        }
 }
 
 /* ---- What comes ---- */
@@ -151,7 +161,8 @@ static bool sort_rim(SkiffSim *sim, EdgePlace *place, Err *err) {
     memset(start, 0, (cells + 2) * sizeof(uint32_t));
     for (uint32_t i = 0; i < particles->count; i++) {
         const float *p = particles->position[i];
-        if (distance_before(place, p) < place->support - RIM * place->radius)
+        if (particles->edge[i] == EDGE_NONE ||
+            distance_before(place, p) < place->support - RIM * place->radius)
             continue;
         start[grid_cell_of(grid, p) + 2]++;
         found[count++] = i;

@@ -249,7 +249,7 @@ static int search(const SearchJob *job, uint32_t block, int thread, Scratch *scr
 typedef struct ContactSum {
     int32_t object;
     int count;
-    Vf weight, g[3], t[3];
+    Vf weight, g[3], t[3], m[6]; /* m: xx, yy, zz, xy, xz, yz of -sum psi_b grad W_ib (x_i - x_b)^T */
 } ContactSum;
 
 typedef struct ContactSums {
@@ -268,7 +268,7 @@ static ContactSum *contact_sum_of(ContactSums *sums, int32_t object) {
     sum->count = 0;
     sum->weight = vf_zero();
     for (int k = 0; k < 3; k++)
-        sum->g[k] = sum->t[k] = vf_zero();
+        sum->g[k] = sum->t[k] = sum->m[k] = sum->m[3 + k] = vf_zero();
     return sum;
 }
 
@@ -300,7 +300,11 @@ static bool contact_add(const BoundaryJob *job, const SampleSet *set, uint32_t s
         for (int k = 0; k < 3; k++) {
             const int a = (k + 1) % 3, b = (k + 2) % 3;
             sum->t[k] = vf_fma(arm[a], g[b], vf_fnma(arm[b], g[a], sum->t[k]));
+            sum->m[k] = vf_fnma(g[k], d[k], sum->m[k]);
         }
+        sum->m[3] = vf_fnma(g[0], d[1], sum->m[3]);
+        sum->m[4] = vf_fnma(g[0], d[2], sum->m[4]);
+        sum->m[5] = vf_fnma(g[1], d[2], sum->m[5]);
         sum->weight = vf_add(sum->weight, vf_mask(mine, weight));
         sum->count += __builtin_popcount(mine);
     }
@@ -341,6 +345,9 @@ static int boundary(const BoundaryJob *job, uint32_t block, Scratch *scratch, ui
     int contact_count = 0;
     const uint32_t begin = block * BLOCK, end = begin + BLOCK < job->count ? begin + BLOCK : job->count;
     for (uint32_t i = begin; i < end; i++) {
+        const bool shaped = job->density != NULL && job->shape[0] != NULL;
+        for (int m = 0; shaped && m < 2; m++)
+            memset(job->shape[m][i], 0, sizeof(Float4));
         if (job->frozen != NULL && job->frozen[i])
             continue;
         ContactSums sums;
@@ -353,6 +360,9 @@ static int boundary(const BoundaryJob *job, uint32_t block, Scratch *scratch, ui
             }
         }
         float g[3] = {0};
+        for (int k = 0; shaped && k < sums.count; k++)
+            for (int a = 0; a < 6; a++)
+                job->shape[a / 3][i][a % 3] += vf_sum(sums.sums[k].m[a]);
         for (int k = 0; k < sums.count; k++) {
             const ContactSum *sum = &sums.sums[k];
             Contact *contact = &scratch->contacts[contact_count++];
@@ -429,8 +439,46 @@ static inline void accelerate_slices(const PairData *pairs, const AccelerateJob 
     }
 }
 
+static inline void prefetch_gradients(const PairData *pairs, uint32_t entry) {
+    const char *at = (const char *)(pairs->gradients + (size_t)entry * 3 * SLICE);
+    __builtin_prefetch(at);
+    __builtin_prefetch(at + 64);
+}
+
+static void accelerate_corrected(const PairData *pairs, const AccelerateJob *job, uint32_t block) {
+    const Vf unit = vf_set(job->scale * pairs->gradient_unit), scale = vf_set(job->scale);
+    for (uint32_t slice = block * BLOCK_SLICES; slice < (block + 1) * BLOCK_SLICES; slice++) {
+        const uint32_t first = slice * SLICE, begin = pairs->slices[slice].start;
+        Vf own[3], own_p, sum[3] = {vf_zero(), vf_zero(), vf_zero()};
+        vf_load4(job->operand + first, &own[0], &own[1], &own[2], &own_p);
+        for (uint32_t entry = begin; entry < begin + pairs->slices[slice].length; entry++) {
+            prefetch_entry(pairs->entries, entry + PREFETCH_ENTRIES, pairs->wide);
+            prefetch_gradients(pairs, entry + PREFETCH_ENTRIES / 2);
+            Vf unused[3], p;
+            gather_neighbours(job->operand + first, pairs->entries, entry, pairs->wide, &unused[0],
+                              &unused[1], &unused[2], &p);
+            const int16_t *gradient = pairs->gradients + (size_t)entry * 3 * SLICE;
+            for (int k = 0; k < 3; k++)
+                sum[k] = vf_fma(p, vf_load_i16(gradient + k * SLICE), sum[k]);
+        }
+        Vf g[3], base[3] = {vf_zero(), vf_zero(), vf_zero()}, arm[3], unused, moment = vf_zero();
+        vf_load4(pairs->gradient_sum + first, &g[0], &g[1], &g[2], &unused);
+        if (job->base != NULL)
+            vf_load4(job->base + first, &base[0], &base[1], &base[2], &unused);
+        own_p = vf_mul(scale, own_p);
+        own_arm(pairs, own[0], own[1], own[2], arm);
+        for (int k = 0; k < 3; k++) {
+            sum[k] = vf_fma(own_p, g[k], vf_fma(sum[k], unit, base[k]));
+            moment = vf_fma(arm[k], sum[k], moment);
+        }
+        vf_store4(job->result + first, sum[0], sum[1], sum[2], moment);
+    }
+}
+
 static void accelerate(const PairData *pairs, const AccelerateJob *job, uint32_t block) {
-    if (pairs->wide)
+    if (pairs->gradients != NULL)
+        accelerate_corrected(pairs, job, block);
+    else if (pairs->wide)
         accelerate_slices(pairs, job, block, true);
     else
         accelerate_slices(pairs, job, block, false);
@@ -463,11 +511,150 @@ static inline void divergence_slices(const PairData *pairs, const Float4 *v, flo
     }
 }
 
+static void divergence_corrected(const PairData *pairs, const Float4 *v, float *result, uint32_t block) {
+    for (uint32_t slice = block * BLOCK_SLICES; slice < (block + 1) * BLOCK_SLICES; slice++) {
+        const uint32_t first = slice * SLICE, begin = pairs->slices[slice].start;
+        Vf sum = vf_zero(), w[3], g[3], unused;
+        for (uint32_t entry = begin; entry < begin + pairs->slices[slice].length; entry++) {
+            prefetch_entry(pairs->entries, entry + PREFETCH_ENTRIES, pairs->wide);
+            prefetch_gradients(pairs, entry + PREFETCH_ENTRIES / 2);
+            gather_neighbours(v + first, pairs->entries, entry, pairs->wide, &w[0], &w[1], &w[2], &unused);
+            const int16_t *gradient = pairs->gradients + (size_t)entry * 3 * SLICE;
+            for (int k = 0; k < 3; k++)
+                sum = vf_fma(w[k], vf_load_i16(gradient + k * SLICE), sum);
+        }
+        sum = vf_mul(vf_set(-pairs->gradient_unit), sum);
+        vf_load4(pairs->gradient_sum + first, &g[0], &g[1], &g[2], &unused);
+        vf_load4(v + first, &w[0], &w[1], &w[2], &unused);
+        for (int k = 0; k < 3; k++)
+            sum = vf_fma(w[k], g[k], sum);
+        vf_store(result + first, sum);
+    }
+}
+
 static void divergence(const PairData *pairs, const Float4 *v, float *result, uint32_t block) {
-    if (pairs->wide)
+    if (pairs->gradients != NULL)
+        divergence_corrected(pairs, v, result, block);
+    else if (pairs->wide)
         divergence_slices(pairs, v, result, block, true);
     else
         divergence_slices(pairs, v, result, block, false);
+}
+
+/* ---- Corrected gradients ---- */
+
+/* Adjugate (xx, yy, zz, xy, xz, yz) of a symmetric matrix in the same order; returns the determinant. */
+static inline Vf adjugate(const Vf m[6], Vf adjugate[6]) {
+    const Vf zero = vf_zero();
+    adjugate[0] = vf_fma(m[1], m[2], vf_mul(vf_sub(zero, m[5]), m[5]));
+    adjugate[1] = vf_fma(m[0], m[2], vf_mul(vf_sub(zero, m[4]), m[4]));
+    adjugate[2] = vf_fma(m[0], m[1], vf_mul(vf_sub(zero, m[3]), m[3]));
+    adjugate[3] = vf_fma(m[4], m[5], vf_mul(vf_sub(zero, m[3]), m[2]));
+    adjugate[4] = vf_fma(m[3], m[5], vf_mul(vf_sub(zero, m[4]), m[1]));
+    adjugate[5] = vf_fma(m[3], m[4], vf_mul(vf_sub(zero, m[5]), m[0]));
+    return vf_fma(m[0], adjugate[0], vf_fma(m[3], adjugate[3], vf_mul(m[4], adjugate[4])));
+}
+
+/* Where neighbours are few, or lie in a plane, B fades to the identity: the determinant of the moments is 1
+ * inside water, about 1/2 at a flat surface. */
+static void shape(const CorrectionJob *job, uint32_t block) {
+    static const float NO_CORRECTION = 0.1f, FULL_CORRECTION = 0.4f, LEAST_DENSITY = 0.8f;
+    const PairData *pairs = job->pairs;
+    const Vf one = vf_set(1.0f);
+    for (uint32_t slice = block * BLOCK_SLICES; slice < (block + 1) * BLOCK_SLICES; slice++) {
+        const uint32_t first = slice * SLICE, begin = pairs->slices[slice].start;
+        Vf own[3], d[3], unused, sum[6], wall[6], cofactors[6];
+        for (int k = 0; k < 6; k++)
+            sum[k] = vf_zero();
+        vf_load4(pairs->position + first, &own[0], &own[1], &own[2], &unused);
+        for (uint32_t entry = begin; entry < begin + pairs->slices[slice].length; entry++) {
+            prefetch_entry(pairs->entries, entry + PREFETCH_ENTRIES, pairs->wide);
+            gather_neighbours(pairs->position + first, pairs->entries, entry, pairs->wide, &d[0], &d[1],
+                              &d[2], &unused);
+            const Vf factor = vf_load_u16(entry_factor(pairs->entries, entry, pairs->wide));
+            for (int k = 0; k < 3; k++)
+                d[k] = vf_sub(own[k], d[k]);
+            const Vf fx = vf_mul(factor, d[0]), fy = vf_mul(factor, d[1]);
+            sum[0] = vf_fma(fx, d[0], sum[0]);
+            sum[1] = vf_fma(fy, d[1], sum[1]);
+            sum[2] = vf_fma(vf_mul(factor, d[2]), d[2], sum[2]);
+            sum[3] = vf_fma(fx, d[1], sum[3]);
+            sum[4] = vf_fma(fx, d[2], sum[4]);
+            sum[5] = vf_fma(fy, d[2], sum[5]);
+        }
+        vf_load4(job->shape[0] + first, &wall[0], &wall[1], &wall[2], &unused);
+        vf_load4(job->shape[1] + first, &wall[3], &wall[4], &wall[5], &unused);
+        for (int k = 0; k < 6; k++)
+            sum[k] = vf_fma(sum[k], vf_set(pairs->factor_unit), wall[k]);
+        const Vf determinant = adjugate(sum, cofactors), least = vf_set(NO_CORRECTION);
+        const Vm sound =
+            vf_less(least, determinant) & vf_less(vf_set(LEAST_DENSITY), vf_load(pairs->density + first));
+        Vf share = vf_mul(vf_sub(determinant, least), vf_set(1.0f / (FULL_CORRECTION - NO_CORRECTION)));
+        share = vf_mask(sound, vf_select(vf_less(one, share), one, share));
+        const Vf root = vf_rsqrt(vf_select(sound, determinant, one));
+        const Vf inverse = vf_mul(share, vf_mul(root, root)), rest = vf_sub(one, share);
+        for (int k = 0; k < 6; k++)
+            cofactors[k] = k < 3 ? vf_fma(inverse, cofactors[k], rest) : vf_mul(inverse, cofactors[k]);
+        vf_store4(job->shape[0] + first, cofactors[0], cofactors[1], cofactors[2], vf_zero());
+        vf_store4(job->shape[1] + first, cofactors[3], cofactors[4], cofactors[5], vf_zero());
+    }
+}
+
+/* Rounded to a whole number of units within 16 bits. */
+static inline void store_gradient(int16_t *to, Vf value) {
+    const Vf limit = vf_set(32767.0f), lowest = vf_set(-32767.0f);
+    value = vf_select(vf_less(limit, value), limit, value);
+    vf_store_i16(to, vf_select(vf_less(value, lowest), lowest, value));
+}
+
+static void correct(const CorrectionJob *job, uint32_t block) {
+    const PairData *pairs = job->pairs;
+    const Vf half = vf_set(-0.5f * pairs->factor_unit / job->gradient_unit);
+    const Vf unit = vf_set(job->gradient_unit), factor_unit = vf_set(pairs->factor_unit);
+    for (uint32_t slice = block * BLOCK_SLICES; slice < (block + 1) * BLOCK_SLICES; slice++) {
+        const uint32_t first = slice * SLICE, begin = pairs->slices[slice].start;
+        Vf own[3], own_b[6], b[6], d[3], unused, raw[3], sum[3], squares = vf_zero();
+        for (int k = 0; k < 3; k++)
+            raw[k] = sum[k] = vf_zero();
+        vf_load4(pairs->position + first, &own[0], &own[1], &own[2], &unused);
+        vf_load4(job->shape[0] + first, &own_b[0], &own_b[1], &own_b[2], &unused);
+        vf_load4(job->shape[1] + first, &own_b[3], &own_b[4], &own_b[5], &unused);
+        for (uint32_t entry = begin; entry < begin + pairs->slices[slice].length; entry++) {
+            prefetch_entry(pairs->entries, entry + PREFETCH_ENTRIES, pairs->wide);
+            gather_neighbours(pairs->position + first, pairs->entries, entry, pairs->wide, &d[0], &d[1],
+                              &d[2], &unused);
+            gather_neighbours((const Float4 *)job->shape[0] + first, pairs->entries, entry, pairs->wide,
+                              &b[0], &b[1], &b[2], &unused);
+            gather_neighbours((const Float4 *)job->shape[1] + first, pairs->entries, entry, pairs->wide,
+                              &b[3], &b[4], &b[5], &unused);
+            const Vf factor = vf_load_u16(entry_factor(pairs->entries, entry, pairs->wide));
+            for (int k = 0; k < 3; k++) {
+                d[k] = vf_mul(factor, vf_sub(own[k], d[k]));
+                raw[k] = vf_add(raw[k], d[k]);
+                d[k] = vf_mul(half, d[k]);
+            }
+            for (int k = 0; k < 6; k++)
+                b[k] = vf_add(own_b[k], b[k]);
+            const Vf g[3] = {vf_fma(b[0], d[0], vf_fma(b[3], d[1], vf_mul(b[4], d[2]))),
+                             vf_fma(b[3], d[0], vf_fma(b[1], d[1], vf_mul(b[5], d[2]))),
+                             vf_fma(b[4], d[0], vf_fma(b[5], d[1], vf_mul(b[2], d[2])))};
+            int16_t *to = job->gradients + (size_t)entry * 3 * SLICE;
+            for (int k = 0; k < 3; k++) {
+                store_gradient(to + k * SLICE, g[k]);
+                const Vf stored = vf_load_i16(to + k * SLICE);
+                sum[k] = vf_add(sum[k], stored);
+                squares = vf_fma(stored, stored, squares);
+            }
+        }
+        /* what walls and bodies add is what the plain sum has beyond its pairs */
+        Vf g[3], norm = vf_mul(vf_mul(unit, unit), squares);
+        vf_load4(pairs->gradient_sum + first, &g[0], &g[1], &g[2], &unused);
+        for (int k = 0; k < 3; k++) {
+            g[k] = vf_fma(unit, sum[k], vf_fma(factor_unit, raw[k], g[k]));
+            norm = vf_fma(g[k], g[k], norm);
+        }
+        vf_store4(job->gradient_sum + first, g[0], g[1], g[2], norm);
+    }
 }
 
 /* ---- Gravity, viscosity and calming ---- */
@@ -527,16 +714,11 @@ static void strain(const StrainJob *job, uint32_t block) {
                 for (int c = 0; c < 3; c++)
                     b[r][c] = vf_fma(v[r], wd[c], b[r][c]);
         }
-        /* adjugate of the symmetric matrix, over the determinant */
-        const Vf cxx = vf_fma(yy, zz, vf_mul(vf_sub(vf_zero(), yz), yz));
-        const Vf cyy = vf_fma(xx, zz, vf_mul(vf_sub(vf_zero(), xz), xz));
-        const Vf czz = vf_fma(xx, yy, vf_mul(vf_sub(vf_zero(), xy), xy));
-        const Vf cxy = vf_fma(xz, yz, vf_mul(vf_sub(vf_zero(), xy), zz));
-        const Vf cxz = vf_fma(xy, yz, vf_mul(vf_sub(vf_zero(), xz), yy));
-        const Vf cyz = vf_fma(xy, xz, vf_mul(vf_sub(vf_zero(), yz), xx));
-        const Vf root = vf_rsqrt(vf_fma(xx, cxx, vf_fma(xy, cxy, vf_mul(xz, cxz))));
+        const Vf moments[6] = {xx, yy, zz, xy, xz, yz};
+        Vf c6[6];
+        const Vf root = vf_rsqrt(adjugate(moments, c6));
         const Vf inv = vf_mul(root, root);
-        const Vf columns[3][3] = {{cxx, cxy, cxz}, {cxy, cyy, cyz}, {cxz, cyz, czz}};
+        const Vf columns[3][3] = {{c6[0], c6[3], c6[4]}, {c6[3], c6[1], c6[5]}, {c6[4], c6[5], c6[2]}};
         for (int c = 0; c < 3; c++) {
             Vf a[3];
             for (int r = 0; r < 3; r++)
@@ -627,6 +809,8 @@ const Passes PASSES_JOIN(passes_, PASSES_ISA) = {
     .boundary = boundary,
     .accelerate = accelerate,
     .divergence = divergence,
+    .shape = shape,
+    .correct = correct,
     .strain = strain,
     .forces = forces,
 };

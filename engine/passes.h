@@ -110,6 +110,8 @@ typedef struct PairData {
     const Float4 *position;
     const float *density;       /* rho / rho0 */
     const Float4 *gradient_sum; /* G_i = sum_j V grad W_ij + g_i; [3]: diagonal of D D^T */
+    const int16_t *gradients;   /* NULL, or [entries][3][SLICE] corrected gradients in place of the factors */
+    float gradient_unit;        /* value of 1 in gradients, 1/m */
 } PairData;
 
 /* The particle in lane `lane` of an entry of the slice that begins at `first`. */
@@ -161,7 +163,19 @@ typedef struct BoundaryJob {
     float *density;       /* NULL: list the contacts only */
     Float4 *gradient_sum; /* in: as the search left it; out: with the boundary, [3] the diagonal */
     uint16_t *neighbours;
+    Float4 *shape[2]; /* NULL, or out: moments of the walls, see CorrectionJob */
 } BoundaryJob;
+
+/* Gradients that are right for linear fields, made in two passes over the rows [Bonet & Lok 1999, kept
+ * antisymmetric]: B_i = [sum_j -V grad W_ij (x_i - x_j)^T, samples of walls and bodies included]^-1, then
+ * (B_i + B_j) / 2 V grad W_ij. What walls and bodies push with stays as it is. */
+typedef struct CorrectionJob {
+    const PairData *pairs;
+    Float4 *shape[2];   /* in: moments of the walls (xx, yy, zz), (xy, xz, yz); `shape` turns them to B */
+    int16_t *gradients; /* out of `correct`: as in PairData */
+    float gradient_unit;
+    Float4 *gradient_sum; /* out of `correct` */
+} CorrectionJob;
 
 /* Vectors that `divergence` takes carry their moment about PairData.centre in the fourth place: with it a
  * pair needs one gather, sum_j f (x_i - x_j) . v_j = x_i . sum_j f v_j - sum_j f x_j . v_j. The difference
@@ -212,6 +226,8 @@ typedef struct Passes {
     /* result_i = (D v)_i = v_i . G_i - sum_j v_j . V grad W_ij, v with moments; contacts with moving bodies
      * are the caller's */
     void (*divergence)(const PairData *pairs, const Float4 *v, float *result, uint32_t block);
+    void (*shape)(const CorrectionJob *job, uint32_t block);
+    void (*correct)(const CorrectionJob *job, uint32_t block);
     /* velocity gradients by weighted least squares over the neighbours */
     void (*strain)(const StrainJob *job, uint32_t block);
     /* gravity, XSPH viscosity and calming, which conserve momentum exactly */
