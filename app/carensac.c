@@ -43,7 +43,9 @@ static const SheetColumn wedge_columns[CARENSAC_WEDGE_COLUMNS] = {
     [CARENSAC_SIDE_START] = {"particles_start", "particles, absorbing side", 0, 0},
     [CARENSAC_SIDE_LEAST] = {"particles_least", "least", 0, 0},
     [CARENSAC_SIDE_END] = {"particles_5_9s", "at 5.9 s", 0, 0},
+    [CARENSAC_DEPTH_END] = {"depth_5_9s", "depth at 5.9 s, m", 3, 0},
     [CARENSAC_ENERGY_RATIO] = {"energy_ratio_2_1s", "energy closed : absorbing, 2.1 s", 2, 0},
+    [CARENSAC_ENERGY_END] = {"energy_percent_5_9s", "absorbing / closed at 5.9 s, %", 1, 0},
 };
 
 static const SheetColumn boat_columns[CARENSAC_BOAT_COLUMNS] = {
@@ -55,6 +57,7 @@ static const SheetColumn boat_columns[CARENSAC_BOAT_COLUMNS] = {
     [CARENSAC_BOAT_AFTER] = {"ms_after_move", "after a move, ms", 1, 0},
     [CARENSAC_BOAT_MEAN] = {"ms_mean", "mean, ms", 1, 0},
     [CARENSAC_BOAT_SPEED] = {"speed", "speed, m/s", 2, 0},
+    [CARENSAC_BOAT_BOW_UP] = {"bow_up_deg", "bow up, deg", 2, 0},
 };
 
 /* A row: its figures in the order of the columns, as far as the paper gives them. */
@@ -79,10 +82,10 @@ static const PaperRow table1_rows[] = {
 };
 
 static const PaperRow float_rows[] = {{"floating cube", {0.4, NONE, 0.2, 0.2}}};
-static const PaperRow wedge_rows[] = {{"wedge", {46000, 38000, 40200, 3}}};
+static const PaperRow wedge_rows[] = {{"wedge", {46000, 38000, 40200, 1, 3, NONE}}};
 static const PaperRow boat_rows[] = {
-    {"cylinder 5 m", {750000, 300000, 75, 3.5, 96, 120, 100, 2.9}},
-    {"cylinder 2.5 m", {187000, 114000, 25, NONE, 40, NONE, 30, NONE}},
+    {"cylinder 5 m", {750000, 300000, 75, 3.5, 96, 120, 100, 2.9, NONE}},
+    {"cylinder 2.5 m", {187000, 114000, 25, NONE, 40, NONE, 30, NONE, NONE}},
 };
 
 /* As in the authors' drivers. */
@@ -184,7 +187,7 @@ bool carensac_sheet(CarensacSheet which, Sheet *sheet, Err *err) {
 /* ---- Set-ups ---- */
 
 static void begin(CarensacSetup *setup, double radius, int block_count) {
-    *setup = (CarensacSetup){.def = skiff_def_default(), .body_stop_time = INFINITY};
+    *setup = (CarensacSetup){.def = skiff_def_default()};
     setup->def.params.particle_radius = (float)radius;
     setup->def.blocks = setup->blocks;
     setup->def.block_count = block_count;
@@ -313,40 +316,6 @@ bool carensac_set_up(int experiment, double radius, const char *folder, Carensac
         set_up_floating_cube(setup, radius);
         return true;
     }
-}
-
-/* The tip begins 0.59 m above the water. Wider than the corridor, it goes through the walls; the authors'
- * code holds it from 0.72 s on, when its tip has gone through the floor too and it parts the corridor in two,
- * which the paper does not say. */
-void carensac_set_up_wedge(CarensacSetup *setup) {
-    /* points of the section and outward directions, (z, y); then the ends */
-    static const float section[6][4] = {
-        {0, -1.414f, 0.865f, -0.566f}, {0, -1.414f, -0.865f, -0.566f}, {0.566f, 0, 1, 0},
-        {-0.566f, 0, -1, 0},           {0, 2.414f, 0.565f, 0.566f},    {0, 2.414f, -0.565f, 0.566f},
-    };
-    begin(setup, CARENSAC_RADIUS, 1);
-    set_tank(setup, 0.5f, 5, 5, 1);
-    setup->def.tank.wet_height = INFINITY; /* the splash of a wedge of 5.6 t */
-    set_box(setup->blocks[0].start, setup->blocks[0].end, 0.5f, 5, 0, 1);
-    for (int i = 0; i < 8; i++) {
-        const float end = i == 6 ? 1.0f : -1.0f;
-        const float point[3] = {i < 6 ? 0 : end, i < 6 ? section[i][1] : 0, i < 6 ? section[i][0] : 0};
-        const float normal[3] = {i < 6 ? 0 : end, i < 6 ? section[i][3] : 0, i < 6 ? section[i][2] : 0};
-        memcpy(setup->plane_points[i], point, sizeof point);
-        memcpy(setup->plane_normals[i], normal, sizeof normal);
-    }
-    setup->body = skiff_body_default();
-    setup->body.name = "wedge";
-    setup->body.geometry.kind = SKIFF_GEOMETRY_PLANES;
-    setup->body.geometry.plane_points = (const float(*)[3])setup->plane_points;
-    setup->body.geometry.plane_normals = (const float(*)[3])setup->plane_normals;
-    setup->body.geometry.plane_count = 8;
-    setup->body.geometry.translation[1] = 3;
-    setup->body.density = 800;
-    setup->body.free_axes = SKIFF_FREE_ALL;
-    setup->body_stop_time = 0.72;
-    setup->def.bodies = &setup->body;
-    setup->def.body_count = 1;
 }
 
 void carensac_offset(int run, double radius, double offset[3]) {

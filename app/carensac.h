@@ -37,10 +37,12 @@ enum {
 
 /* Columns of fig5. */
 enum {
-    CARENSAC_SIDE_START,
+    CARENSAC_SIDE_START, /* particles of the absorbing half */
     CARENSAC_SIDE_LEAST,
-    CARENSAC_SIDE_END,
-    CARENSAC_ENERGY_RATIO,
+    CARENSAC_SIDE_END,     /* particles at 5.9 s */
+    CARENSAC_DEPTH_END,    /* m, there and then */
+    CARENSAC_ENERGY_RATIO, /* peaks of the first reflection, closed : absorbing */
+    CARENSAC_ENERGY_END,   /* at 5.9 s, of the absorbing half, % of the closed one's */
     CARENSAC_WEDGE_COLUMNS
 };
 
@@ -54,6 +56,7 @@ enum {
     CARENSAC_BOAT_AFTER,
     CARENSAC_BOAT_MEAN,
     CARENSAC_BOAT_SPEED,
+    CARENSAC_BOAT_BOW_UP, /* degrees */
     CARENSAC_BOAT_COLUMNS
 };
 
@@ -93,8 +96,6 @@ typedef struct CarensacSetup {
     SkiffBodyDef body;
     bool removes; /* before the last block comes, water in [removed_min, removed_max] goes */
     float removed_min[3], removed_max[3]; /* m */
-    double body_stop_time;                /* s, from when on the body is held; infinity: never */
-    float plane_points[8][3], plane_normals[8][3];
     char mesh[4096]; /* file that the set-up wrote, to be removed by the caller; "" : none */
 } CarensacSetup;
 
@@ -113,8 +114,6 @@ enum {
 /* Set-up of an experiment of table1 for particles of `radius` (m); fig2 and fig4c use the floating cube.
  * Files it needs are written to `folder`. */
 bool carensac_set_up(int experiment, double radius, const char *folder, CarensacSetup *setup, Err *err);
-/* Set-up of fig5: a wedge that falls into a corridor. */
-void carensac_set_up_wedge(CarensacSetup *setup);
 
 /* Shift of the points of water at rest in a run, from -d to d on each axis, m. */
 void carensac_offset(int run, double radius, double offset[3]);

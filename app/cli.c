@@ -2,7 +2,6 @@
  * Err into messages and the exit code. */
 #include "cli.h"
 
-#include "carensac.h"
 #include "commands.h"
 #include "nearest.h"
 #include "problems.h"
@@ -212,6 +211,14 @@ static const Option rest_make_options[] = {
     OPTION_ROW_HELP,
 };
 
+static const Option rest_surface_options[] = {
+    {'o', "output", "FILE", OPTION_TEXT, AT(output), .help = "Write the surface (default: measure it only)"},
+    {0, "threads", "N", OPTION_INTEGER, AT(threads), .min = 1, .max = 1024,
+     .help = "Threads (default: one for each core). The result does not depend on it"},
+    OPTION_ROW_JSON,
+    OPTION_ROW_HELP,
+};
+
 static const Option rest_cut_options[] = {
     {'o', "output", "FILE", OPTION_TEXT, AT(output), .help = "Write the block; required"},
     {0, "min", "X,Y,Z", OPTION_VECTOR, AT(min),
@@ -236,11 +243,14 @@ static const Option rest_fill_options[] = {
 };
 
 static const Option reproduce_options[] = {
+    {0, "radius", "R", OPTION_NUMBER, AT(radius), .min = 0.01, .max = 0.08,
+     .help =
+         "Particle radius, m (default 0.025, as the paper); larger for a quick look. In fig5 and boat the "
+         "time step grows with it"},
+    {'d', "duration", "S", OPTION_NUMBER, AT(duration), .min = 0.1, .max = 1000,
+     .help = "Simulated seconds of fig5 and boat (default 6.6 and 25, of which 5 without thrust)"},
     {0, "runs", "N", OPTION_INTEGER, AT(runs), .min = 1, .max = 10000,
      .help = "Fills of each row of table1 and fig2, each with another offset (default 51, as the paper)"},
-    {0, "radius", "R", OPTION_NUMBER, AT(radius), .min = 0.0125, .max = 0.1,
-     .help = "Particle radius, m (default 0.025, as the paper): 0.05 gives a quick look at an eighth of the "
-             "particles"},
     {'o', "output", "DIR", OPTION_TEXT, AT(output), .help = "Folder for report.html and the CSV files"},
     {0, "json", NULL, OPTION_FLAG, AT(json), .help = "One line of JSON for each row in place of the tables"},
     OPTION_ROWS_ENGINE,
@@ -273,6 +283,7 @@ static const Command commands[] = {
      "and state.skiff (checkpoint); with pictures also frames/ and video.mp4.\n"
      "Ctrl-C finishes the step, writes a checkpoint and the report, and exits with 130; --resume goes on "
      "from there.\n",
+     "  skiff run assets/scenes/boat.json --input assets/inputs/slalom.input -o out/slalom --no-render\n"
      "  skiff run assets/scenes/settling-tank.json -o out/tank\n"
      "  skiff run assets/scenes/dam-body.json -o out/dam --duration 2 --set RigidBodies[0].density=300\n"
      "  skiff run assets/scenes/dam-body.json -o out/dam --resume --duration 4\n"
@@ -310,6 +321,12 @@ static const Command commands[] = {
      "  skiff rest make\n"
      "  skiff rest make --edge 16 --seed 7 -o tile.skiff\n",
      rest_make_options, COUNT(rest_make_options), rest_make_command},
+    {"rest surface", NULL, false, "[-o FILE]", "Make the surface of the sea: the built-in tile, settled",
+     "Cuts the tile that is part of the program at a level and lets what is left settle there, repeating\n"
+     "without end to all sides. The sea ahead of a window is made of it and of the tile below. The surface\n"
+     "itself is part of the program, too; it has to be made anew when the tile is.\n",
+     "  skiff rest surface -o assets/rest/surface.skiff\n", rest_surface_options, COUNT(rest_surface_options),
+     rest_surface_command},
     {"rest cut", "folder", true, "DIR -o FILE", "Cut a block of water at rest out of a finished run",
      "Takes the particles of a box out of the last state of a run, a tank that has settled, and prints how "
      "much\n"
@@ -337,11 +354,15 @@ static const Command commands[] = {
      "  table1   four fills with water at rest: counts, times, iterations, speeds afterwards\n"
      "  fig2     rules of the selection, over their parameters\n"
      "  fig4c    a floating cube for 3 s after a fill\n"
-     "  all      all of these (default)\n"
-     "Rows with the paper's name follow its method; those named \"defaults\" are what this program does by\n"
+     "  fig5     a wedge falls into a corridor with one absorbing end: energies, counts, depth\n"
+     "  boat     a boat in the moving windows of 5 m and 2.5 m: speed, times of steps\n"
+     "  all      all of these (default); boat alone takes an hour or more\n"
+     "In fills, rows with the paper's name follow its method; those named \"defaults\" are what this program "
+     "does by\n"
      "itself.\n",
      "  skiff reproduce carensac2023 table1 --runs 5\n"
-     "  skiff reproduce carensac2023 fig4c --radius 0.05 -o float\n"
+     "  skiff reproduce carensac2023 fig4c --radius 0.05 -o out/fig4c\n"
+     "  skiff reproduce carensac2023 fig5 --radius 0.05 -o out/fig5\n"
      "  skiff reproduce carensac2023 all -o out/carensac2023\n",
      reproduce_options, COUNT(reproduce_options), reproduce_carensac_command},
     {"render", "folder of a run", true, "DIR", "Draw a finished run again, or export its particles",
@@ -383,7 +404,10 @@ static void print_wrapped(const char *text, int indent, int width) {
 static void print_usage(const Command *command) {
     char usage[64];
     snprintf(usage, sizeof usage, "skiff %s %s", command->name, command->arguments);
-    printf("  %-28s %s\n", usage, command->summary);
+    printf("  %-28s", usage);
+    if (strlen(usage) > 28)
+        printf("\n  %-28s", "");
+    printf(" %s\n", command->summary);
 }
 
 static void print_main_help(void) {
@@ -395,7 +419,8 @@ static void print_main_help(void) {
     fputs(
         "\nScenes are JSON files; assets/scenes has examples and `skiff check --schema` lists every key.\n"
         "\nExamples:\n"
-        "  skiff run assets/scenes/settling-tank.json -o out/tank     then open out/tank/report.html\n"
+        "  skiff run assets/scenes/boat.json -o out/boat --video      then open out/boat/report.html\n"
+        "  skiff profile out/boat\n"
         "  skiff check assets/scenes/floating-box.json\n"
         "  skiff bench assets/scenes/bench-tank.json --json\n"
         "\nExit codes: 0 ok, 2 usage, 3 bad input, 4 no OpenGL, 5 diverged, 6 reading or writing failed, 130 "
@@ -581,7 +606,7 @@ static CliArgs default_args(void) {
                      .windows = 5,
                      .free_steps = 100,
                      .runs = 51,
-                     .radius = CARENSAC_RADIUS,
+                     .radius = NAN,
                      .edge = 12,
                      .seed = 1,
                      .min = {NAN, NAN, NAN},

@@ -12,6 +12,7 @@ bool render_command(const CliArgs *args, Err *err);
 bool gl_info_command(const CliArgs *args, Err *err);
 bool profile_command(const CliArgs *args, Err *err);
 bool rest_make_command(const CliArgs *args, Err *err);
+bool rest_surface_command(const CliArgs *args, Err *err);
 bool rest_cut_command(const CliArgs *args, Err *err);
 bool rest_show_command(const CliArgs *args, Err *err);
 bool rest_fill_command(const CliArgs *args, Err *err);

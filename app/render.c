@@ -86,6 +86,7 @@ static bool begin(Redraw *redraw, Err *err) {
         return false;
     redraw->options.draws = true;
     if (!exports(args)) {
+        redraw->scene->def.sea.dry = true;
         redraw->sim = scene_start(redraw->scene, 0, SKIFF_SIMD_AUTO, err); /* for its meshes */
         if (!redraw->sim || !(redraw->view = view_create(&redraw->options, redraw->scene, redraw->sim, err)))
             return false;

@@ -8,7 +8,7 @@
 #include "commands.h"
 #include "csv.h"
 #include "html.h"
-#include "machine.h"
+#include "reproduce.h"
 #include "svg.h"
 
 #include "engine/base/file.h"
@@ -29,7 +29,8 @@ typedef struct Reproduction {
         double *values[4];
         size_t count;
     } series[CARENSAC_METHOD_COUNT];
-    char folder[4096]; /* where set-ups write their meshes */
+    Series wedge, boats[REPRODUCE_BOAT_WINDOWS]; /* of fig5, of boat */
+    char folder[4096];                           /* where set-ups write their meshes */
     Machine machine;
 } Reproduction;
 
@@ -40,6 +41,16 @@ static bool wants(const Reproduction *run, CarensacSheet sheet) {
 static void tell(const Reproduction *run, const char *what, const char *row, int done, int count) {
     if (!run->args->quiet)
         fprintf(stderr, "%s, %s: %d of %d\n", what, row, done, count);
+}
+
+double reproduce_radius(const CliArgs *args, double standard) {
+    return isnan(args->radius) ? standard : args->radius;
+}
+
+void reproduce_tell(const ReproduceJob *job, const char *row, const SkiffSim *sim, double end) {
+    const double time = skiff_time(sim), before = time - (double)skiff_params(sim)->time_step;
+    if (!job->args->quiet && floor(20 * time / end) > floor(20 * before / end))
+        fprintf(stderr, "%s, %s: %.2f of %g s\n", job->sheet->name, row, time, end);
 }
 
 /* ---- Filling ---- */
@@ -145,7 +156,8 @@ typedef struct Filling {
 
 static bool fill_row(Reproduction *run, Sheet *sheet, int row, const Filling *filling, Err *err) {
     CarensacSetup setup;
-    if (!carensac_set_up(filling->experiment, run->args->radius, run->folder, &setup, err))
+    if (!carensac_set_up(filling->experiment, reproduce_radius(run->args, CARENSAC_RADIUS), run->folder,
+                         &setup, err))
         return false;
     if (filling->method == CARENSAC_PAPER)
         carensac_set_paper_method(&setup.def.params);
@@ -221,7 +233,8 @@ static bool sum_up_floating(Reproduction *run, int row, Err *err) {
 
 static bool float_row(Reproduction *run, int row, Err *err) {
     CarensacSetup setup;
-    if (!carensac_set_up(CARENSAC_FLOATING_CUBE, run->args->radius, run->folder, &setup, err))
+    if (!carensac_set_up(CARENSAC_FLOATING_CUBE, reproduce_radius(run->args, CARENSAC_RADIUS), run->folder,
+                         &setup, err))
         return false;
     if (row == CARENSAC_PAPER)
         carensac_set_paper_method(&setup.def.params);
@@ -242,6 +255,22 @@ static bool float_row(Reproduction *run, int row, Err *err) {
 
 static bool run_fig4c(Reproduction *run, Err *err) {
     return float_row(run, CARENSAC_PAPER, err) && float_row(run, CARENSAC_DEFAULTS, err);
+}
+
+/* ---- Over time ---- */
+
+static ReproduceJob job_of(Reproduction *run, CarensacSheet sheet) {
+    return (ReproduceJob){run->args, &run->sheets[sheet], run->folder, &run->machine};
+}
+
+static bool run_fig5(Reproduction *run, Err *err) {
+    const ReproduceJob job = job_of(run, CARENSAC_FIG5);
+    return reproduce_wedge(&job, &run->wedge, err);
+}
+
+static bool run_boat(Reproduction *run, Err *err) {
+    const ReproduceJob job = job_of(run, CARENSAC_BOAT);
+    return reproduce_boat(&job, run->boats, err);
 }
 
 /* ---- Results ---- */
@@ -317,11 +346,12 @@ static bool write_page(const Reproduction *run, Err *err) {
             ", %d of %d cores, %s, commit <code>%s</code>; the paper's times are of a GPU, an RTX 2070 SUPER"
             "</p>\n",
             run->machine.threads, run->machine.cores, run->machine.isa, run->machine.commit);
-    if (run->args->radius != CARENSAC_RADIUS)
+    if (reproduce_radius(run->args, CARENSAC_RADIUS) != CARENSAC_RADIUS)
         fprintf(out,
                 "<p>Particles of radius %g m where the paper has %g m: a quick look, not a comparison.</p>\n",
                 run->args->radius, CARENSAC_RADIUS);
-    fputs("<p>Rows with the paper's name follow its method: only particles near solids and existing water "
+    fputs("<p>In fills, rows with the paper's name follow its method: only particles near solids and "
+          "existing water "
           "settle, for at most ten steps, and nothing is calmed afterwards either. Rows named "
           "<i>defaults</i> are what the program does by itself.</p>\n",
           out);
@@ -333,12 +363,22 @@ static bool write_page(const Reproduction *run, Err *err) {
             write_fig2_charts(out, &run->sheets[s]);
         if (s == CARENSAC_FIG4C)
             write_fig4c_charts(out, run);
+        if (s == CARENSAC_FIG5)
+            reproduce_wedge_charts(out, &run->wedge);
+        if (s == CARENSAC_BOAT)
+            reproduce_boat_charts(out, &run->sheets[s], run->boats);
     }
     html_end(out);
     return file_commit(&writer, err);
 }
 
-static bool write_series(const Reproduction *run, Err *err) {
+static bool write_one_series(const Reproduction *run, const Series *series, const char *name, Err *err) {
+    char path[4200];
+    snprintf(path, sizeof path, "%s/%s-series.csv", run->args->output, name);
+    return series_write(series, path, err);
+}
+
+static bool write_fig4c_series(const Reproduction *run, Err *err) {
     CsvWriter csv;
     char path[4200];
     snprintf(path, sizeof path, "%s/fig4c-series.csv", run->args->output);
@@ -361,7 +401,11 @@ static bool write_files(const Reproduction *run, Err *err) {
         if (wants(run, (CarensacSheet)s) && !sheet_write_csv(&run->sheets[s], path, err))
             return false;
     }
-    return (!wants(run, CARENSAC_FIG4C) || write_series(run, err)) && write_page(run, err);
+    return (!wants(run, CARENSAC_FIG4C) || write_fig4c_series(run, err)) &&
+           (!wants(run, CARENSAC_FIG5) || write_one_series(run, &run->wedge, "fig5", err)) &&
+           (!wants(run, CARENSAC_BOAT) || (write_one_series(run, &run->boats[0], "boat-5m", err) &&
+                                           write_one_series(run, &run->boats[1], "boat-2.5m", err))) &&
+           write_page(run, err);
 }
 
 static void print_sheets(const Reproduction *run) {
@@ -386,9 +430,9 @@ static const struct {
     CarensacSheet sheet;
     bool (*run)(Reproduction *run, Err *err);
 } experiments[] = {
-    {"table1", CARENSAC_TABLE1, run_table1},
-    {"fig2", CARENSAC_FIG2, run_fig2},
-    {"fig4c", CARENSAC_FIG4C, run_fig4c},
+    {"table1", CARENSAC_TABLE1, run_table1}, {"fig2", CARENSAC_FIG2, run_fig2},
+    {"fig4c", CARENSAC_FIG4C, run_fig4c},    {"fig5", CARENSAC_FIG5, run_fig5},
+    {"boat", CARENSAC_BOAT, run_boat},
 };
 enum { EXPERIMENT_COUNT = sizeof experiments / sizeof *experiments };
 
@@ -404,7 +448,8 @@ static bool choose(Reproduction *run, Err *err) {
         if (!carensac_sheet(experiments[e].sheet, &run->sheets[experiments[e].sheet], err))
             return false;
     }
-    return known || err_set(err, ERR_USAGE, "expected table1, fig2, fig4c or all, found \"%.80s\"", wanted);
+    return known || err_set(err, ERR_USAGE,
+                            "expected table1, fig2, fig4c, fig5, boat or all, found \"%.80s\"", wanted);
 }
 
 /* The results' folder, or without one a temporary folder for the set-ups' meshes. */
@@ -435,5 +480,8 @@ bool reproduce_carensac_command(const CliArgs *args, Err *err) {
     for (int m = 0; m < CARENSAC_METHOD_COUNT; m++)
         for (int k = 0; k < 4; k++)
             free(run.series[m].values[k]);
+    series_free(&run.wedge);
+    for (int w = 0; w < REPRODUCE_BOAT_WINDOWS; w++)
+        series_free(&run.boats[w]);
     return good;
 }

@@ -106,6 +106,10 @@ bool rest_make_command(const CliArgs *args, Err *err) {
     return finish_tile(skiff_tile_make(&def, err), args, err);
 }
 
+bool rest_surface_command(const CliArgs *args, Err *err) {
+    return finish_tile(skiff_tile_surface(args->threads, err), args, err);
+}
+
 bool rest_show_command(const CliArgs *args, Err *err) {
     return finish_tile(skiff_tile_open(args->scene, err), args, err);
 }

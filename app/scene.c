@@ -105,6 +105,9 @@ static SkiffBodyDef body_def(const SceneBody *body) {
     memcpy(def.angular_velocity, body->angular_velocity, sizeof def.angular_velocity);
     def.free_axes = body->free_axes;
     def.release_time = body->release_time;
+    if (!isnan(body->stop_time))
+        def.stop_time = body->stop_time;
+    def.ramp_time = body->ramp_time;
     def.drive = body->drive;
     return def;
 }

@@ -411,7 +411,9 @@ static void init_body(void *object) {
                         .density = NAN,
                         .mass = NAN,
                         .free_axes = UINT32_MAX,
-                        .release_time = def.release_time};
+                        .release_time = def.release_time,
+                        .stop_time = NAN,
+                        .ramp_time = def.ramp_time};
     set3(body->box, NAN, NAN, NAN);
     memcpy(body->velocity, def.velocity, sizeof body->velocity);
     memcpy(body->angular_velocity, def.angular_velocity, sizeof body->angular_velocity);
@@ -471,6 +473,10 @@ static const Field body_fields[] = {
      .help = "Axes along and about which a dynamic body can move; absent: all"},
     {ROW(FIELD_DOUBLE, SceneBody, release_time, "releaseTime"), DURATION,
      .help = "A dynamic body is held until then"},
+    {ROW(FIELD_DOUBLE, SceneBody, stop_time, "stopTime"), DURATION, .flags = FIELD_NULLABLE,
+     .help = "From then on the body is held where it is; absent: never"},
+    {ROW(FIELD_DOUBLE, SceneBody, ramp_time, "rampTime"), DURATION,
+     .help = "Velocities along and about axes that are not free rise from 0 to their value until then"},
     {ROW(FIELD_OBJECT, SceneBody, drive, "drive"), .flags = FIELD_NULLABLE, .object = &drive_type,
      .help = "Propulsion and steering; absent: none"},
 };

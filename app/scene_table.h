@@ -60,7 +60,8 @@ typedef struct SceneBody {
     float velocity[3], angular_velocity[3];
     bool is_dynamic;
     uint32_t free_axes; /* UINT32_MAX: absent */
-    double release_time;
+    double release_time, ramp_time;
+    double stop_time;     /* NaN: absent */
     SkiffDriveDef *drive; /* NULL: absent */
 } SceneBody;
 

@@ -50,26 +50,50 @@ static float wall_density(const SkiffSim *sim, const float p[3]) {
     return (float)sum;
 }
 
+/* For water_gather: along the inside of an edge of water. */
+static float outside_layer(const void *user, const float p[3]) {
+    const SkiffSim *sim = user;
+    const float layer = sim->params.inflow_layer * sim->params.particle_radius;
+    const float distance = shape_distance_sides(&sim->tank, p, NULL);
+    return fmaxf(distance, -layer - distance);
+}
+
+/* The water at rest of which the inlets are part. */
+static bool inlet_source(SkiffSim *sim, const RestFitted **source, Err *err) {
+    Sea *sea = &sim->sea;
+    *source = &sea->ring;
+    if (!sea->water_edge)
+        return true;
+    WaterPlace place = {
+        .surface = (float)(sea->level - sim->origin[1]), .outside = outside_layer, .user = sim};
+    memcpy(place.origin, sim->origin, sizeof place.origin);
+    memcpy(place.bounds.min, sim->tank.min, sizeof place.bounds.min);
+    memcpy(place.bounds.max, sim->tank.max, sizeof place.bounds.max);
+    *source = &sea->laid.water;
+    return water_gather(&sea->water, &place, &sea->laid, err);
+}
+
 bool absorb_make(SkiffSim *sim, Err *err) {
     Sea *sea = &sim->sea;
     if (!sea->absorbs)
         return true;
     const float layer = sim->params.inflow_layer * sim->params.particle_radius;
     const float level = (float)(sea->level - sim->origin[1]);
+    const RestFitted *source;
     uint32_t count = 0;
-    if (!inlet_reserve(sea, sea->ring.count, err))
+    if (!inlet_source(sim, &source, err) || !inlet_reserve(sea, source->count + source->count / 8, err))
         return false;
-    for (uint32_t i = 0; i < sea->ring.count; i++) {
-        const float *p = sea->ring.position[i];
+    for (uint32_t i = 0; i < source->count; i++) {
+        const float *p = source->position[i];
         float normal[3];
         if (p[1] >= level || !in_region(sea, p) || shape_distance_sides(&sim->tank, p, normal) < -layer)
             continue;
         memcpy(sea->inlets[count], p, 3 * sizeof(float));
-        sea->inlets[count][3] = wall_density(sim, p);
+        sea->inlets[count][3] = sea->water_edge ? 0.0f : wall_density(sim, p);
         const float length = sqrtf(normal[0] * normal[0] + normal[2] * normal[2]);
         sea->inlet_normals[count][0] = length > 0.0f ? -normal[0] / length : 0.0f;
         sea->inlet_normals[count][2] = length > 0.0f ? -normal[2] / length : 0.0f;
-        memcpy(sea->inlet_pressure[count], sea->ring.pressure[i], sizeof(float[2]));
+        memcpy(sea->inlet_pressure[count], source->pressure[i], sizeof(float[2]));
         count++;
     }
     sea->inlet_count = count;
@@ -132,7 +156,7 @@ static void try_inlet(const SkiffSim *sim, uint32_t index, float flow[4]) {
     }
     weight_sum += (double)p[3]; /* the walls, which stand still */
     if (weight_sum + (double)(sim->volume * sim->kernel.w_scale) > (double)sim->params.inflow_density ||
-        body_is_near(sim, p, distance))
+        body_is_near(sim, p, distance) || rest_clearance(sim, p, false) < 0.0f)
         return;
     for (int k = 0; k < 3; k++)
         flow[k] = weight_sum > 0.0 ? (float)(sum[k] / weight_sum) : 0.0f;
@@ -164,10 +188,19 @@ static bool let_out(SkiffSim *sim, Err *err) {
     Particles *particles = &sim->particles;
     const float level = (float)(sea->level - sim->origin[1]);
     const float layer = sim->params.outflow_distance * sim->params.particle_radius;
+    if (!buffer_reserve(&sim->sea.distance_buffer, "distances to the edge",
+                        (size_t)particles->capacity * sizeof(float), err))
+        return false;
+    float *distance = sea->distance_buffer.data;
+    shape_distances_sides(&sim->tank, (const float(*)[4])particles->position, particles->count, distance,
+                          sim->threads);
+    /* from the last to the first: who takes the place of one that goes has been looked at */
     for (uint32_t i = particles->count; i-- > 0;) {
         const float *p = particles->position[i];
+        if (particles->edge[i] != EDGE_NONE)
+            continue;
         /* above the surface near the edge; and what has got through or over the walls */
-        const float depth = !in_region(sea, p) ? INFINITY : -shape_distance_sides(&sim->tank, p, NULL);
+        const float depth = !in_region(sea, p) ? INFINITY : -distance[i];
         if (!(depth < (p[1] > level ? layer : -sim->params.particle_radius)))
             continue;
         if (!ghosts_reserve(&sim->ghosts, 1, sim->time, err))

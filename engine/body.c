@@ -74,6 +74,11 @@ static bool body_check(const SkiffBodyDef *def, const char *path, Err *err) {
         good = err_add(err, ERR_INPUT, "%s.freeAxes: %u has unknown bits", path, def->free_axes);
     if (isnan(def->release_time))
         good = err_add(err, ERR_INPUT, "%s.releaseTime: must be a number", path);
+    if (!(def->stop_time > def->release_time))
+        good = err_add(err, ERR_INPUT, "%s.stopTime: %g s, must be after the release at %g s", path,
+                       def->stop_time, def->release_time);
+    if (!(def->ramp_time >= 0.0 && isfinite(def->ramp_time)))
+        good = err_add(err, ERR_INPUT, "%s.rampTime: %g s, must be 0 or more", path, def->ramp_time);
     return good;
 }
 
@@ -88,6 +93,8 @@ bool body_make(const SkiffBodyDef *def, const char *path, Body *body, Err *err) 
     body->volume = mass.volume;
     body->free_axes = def->free_axes;
     body->release_time = def->release_time;
+    body->stop_time = def->stop_time;
+    body->ramp_time = def->ramp_time;
     body->rotation[3] = 1.0;
     bool moving = def->free_axes != 0;
     float shift[3];
@@ -126,15 +133,27 @@ void body_free(Body *body) {
 }
 
 bool body_held(const Body *body, double time) {
-    return time < body->release_time;
+    return time < body->release_time || time >= body->stop_time;
+}
+
+/* Share of a prescribed velocity in the middle of the step that begins at `time`. */
+static double ramp_share(const Body *body, double time, double dt) {
+    const double share = body->ramp_time > 0.0 ? fmax(time + 0.5 * dt, 0.0) / body->ramp_time : 1.0;
+    return share < 1.0 ? share * share * (3.0 - 2.0 * share) : 1.0;
 }
 
 void body_hold(Body *body, double time, double dt) {
+    const bool stopped = time >= body->stop_time;
     const bool held = body_held(body, time), released = !held && time - dt < body->release_time;
+    const double share = stopped ? 0.0 : ramp_share(body, time, dt);
     for (int k = 0; k < 3; k++) {
-        if (body->free_axes >> k & 1 && (held || released))
+        if (!(body->free_axes >> k & 1))
+            body->velocity[k] = share * body->start_velocity[k];
+        else if (held || released)
             body->velocity[k] = held ? 0.0 : body->start_velocity[k];
-        if (body->free_axes >> (3 + k) & 1 && (held || released))
+        if (!(body->free_axes >> (3 + k) & 1))
+            body->angular_velocity[k] = share * body->start_angular_velocity[k];
+        else if (held || released)
             body->angular_velocity[k] = held ? 0.0 : body->start_angular_velocity[k];
     }
 }

@@ -12,7 +12,7 @@ typedef struct Body {
     Mesh mesh;  /* body axes, about the centre of mass */
     bool fixed; /* never moves: its samples are sorted once, with the walls */
     uint32_t free_axes;
-    double release_time;
+    double release_time, stop_time, ramp_time;
     double mass, volume;  /* kg, m^3 */
     double reach;         /* m, from the centre of mass to the farthest vertex */
     double inertia[3][3]; /* kg m^2, body axes */
@@ -33,8 +33,8 @@ typedef struct Body {
 bool body_make(const SkiffBodyDef *def, const char *path, Body *body, Err *err);
 void body_free(Body *body);
 
-/* Stops the free axes of a body that is still held; gives it its initial velocity in the step of its release.
- */
+/* Before a step that begins at `time`: stops what is held, gives a body its initial velocity in the step of
+ * its release, and brings prescribed velocities to their values. */
 void body_hold(Body *body, double time, double dt);
 /* Rotation matrix and inverse masses for a step that begins at `time`. */
 void body_prepare(Body *body, double time);

@@ -183,17 +183,28 @@ static void mark_occupied(const CellGrid *grid, uint8_t *occupied) {
             }
 }
 
+static bool in_reach(const BoundarySet *set, uint32_t s) {
+    for (int k = 0; set->has_reach && k < 3; k++)
+        if (!(set->world[s][k] >= set->reach.min[k] && set->world[s][k] <= set->reach.max[k]))
+            return false;
+    return true;
+}
+
 bool boundary_sort(BoundarySet *set, float cell_size, Err *err) {
     const uint32_t count = set->samples.count;
-    set->sorted.count = count;
-    if (count == 0)
-        return true;
     GridBounds bounds = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-    for (uint32_t s = 0; s < count; s++)
+    set->sorted.count = 0;
+    for (uint32_t s = 0; s < count; s++) {
+        if (!in_reach(set, s))
+            continue;
+        set->sorted.count++;
         for (int k = 0; k < 3; k++) {
             bounds.min[k] = fminf(bounds.min[k], set->world[s][k]);
             bounds.max[k] = fmaxf(bounds.max[k], set->world[s][k]);
         }
+    }
+    if (set->sorted.count == 0)
+        return true;
     /* two empty layers: the 27 cells around an occupied one, and around those, exist */
     if (!grid_layout(&set->sorted.grid, &bounds, cell_size, 2))
         return err_set(err, ERR_DIVERGED, "the boundary samples spread over more than %d cells of %g m",
@@ -205,7 +216,8 @@ bool boundary_sort(BoundarySet *set, float cell_size, Err *err) {
     uint32_t *start = set->cells.data;
     memset(start, 0, (cells + 1) * sizeof(uint32_t));
     for (uint32_t s = 0; s < count; s++)
-        start[grid_cell_of(grid, set->world[s]) + 1]++;
+        if (in_reach(set, s))
+            start[grid_cell_of(grid, set->world[s]) + 1]++;
     for (size_t c = 0; c < cells; c++)
         start[c + 1] += start[c];
     /* samples come grouped by object, and a stable sort keeps them so within a cell */
@@ -213,6 +225,8 @@ bool boundary_sort(BoundarySet *set, float cell_size, Err *err) {
     float *volume = (float *)set->sorted.volume;
     int32_t *object = (int32_t *)set->sorted.object;
     for (uint32_t s = 0; s < count; s++) {
+        if (!in_reach(set, s))
+            continue;
         const uint32_t to = start[grid_cell_of(grid, set->world[s])]++;
         x[to] = set->world[s][0];
         y[to] = set->world[s][1];

@@ -2,6 +2,8 @@
 #include "ghosts.h"
 
 #include <assert.h>
+#include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 enum { GHOST_BYTES = 2 * sizeof(Float4) + sizeof(uint64_t) + 2 * sizeof(double) };
@@ -68,6 +70,78 @@ void ghosts_shift(Ghosts *ghosts, const float shift[3]) {
     for (uint32_t g = ghosts->first; g < ghosts->first + ghosts->count; g++)
         for (int k = 0; k < 3; k++)
             ghosts->position[g][k] -= shift[k];
+}
+
+/* ---- Keeping them ---- */
+
+static const struct {
+    const char *name;
+    StateType type;
+    uint32_t components;
+} field_types[GHOST_FIELDS] = {{"ghost_position", STATE_F32, 4},
+                               {"ghost_velocity", STATE_F32, 4},
+                               {"ghost_id", STATE_U64, 1},
+                               {"ghost_birth", STATE_F64, 1},
+                               {"ghost_removed", STATE_F64, 1}};
+
+void ghosts_describe(const Ghosts *ghosts, StateField fields[GHOST_FIELDS]) {
+    const uint32_t first = ghosts->first;
+    const bool some = ghosts->count > 0;
+    const void *data[GHOST_FIELDS] = {some ? ghosts->position + first : NULL,
+                                      some ? ghosts->velocity + first : NULL,
+                                      some ? ghosts->id + first : NULL, some ? ghosts->birth + first : NULL,
+                                      some ? ghosts->removed + first : NULL};
+    for (int f = 0; f < GHOST_FIELDS; f++) {
+        fields[f] = (StateField){.type = field_types[f].type,
+                                 .components = field_types[f].components,
+                                 .count = ghosts->count,
+                                 .data = data[f]};
+        snprintf(fields[f].name, sizeof fields[f].name, "%s", field_types[f].name);
+    }
+}
+
+/* In the order of their going. */
+static bool times_are_good(const double *birth, const double *removed, uint64_t count) {
+    for (uint64_t i = 0; i < count; i++)
+        if (!isfinite(birth[i]) || !isfinite(removed[i]) || (i > 0 && removed[i] < removed[i - 1]))
+            return false;
+    return true;
+}
+
+static bool all_finite(const float *values, uint64_t count) {
+    for (uint64_t i = 0; i < count; i++)
+        if (!isfinite(values[i]))
+            return false;
+    return true;
+}
+
+bool ghosts_load(Ghosts *ghosts, const StateFile *file, const char *path, Err *err) {
+    const StateField *fields[GHOST_FIELDS];
+    uint64_t count = UINT64_MAX;
+    for (int f = 0; f < GHOST_FIELDS; f++) {
+        fields[f] = state_file_field(file, field_types[f].name, field_types[f].type,
+                                     field_types[f].components, count, err);
+        if (fields[f] == NULL)
+            return false;
+        count = fields[f]->count;
+    }
+    if (count > UINT32_MAX / 4 || !all_finite(fields[0]->data, 4 * count) ||
+        !all_finite(fields[1]->data, 4 * count) || !times_are_good(fields[3]->data, fields[4]->data, count))
+        return err_set(err, ERR_INPUT, "%s: what is said of removed particles is out of range", path);
+    Ghosts loaded = {0};
+    if (!ghosts_reserve(&loaded, (uint32_t)count, 0, err))
+        return false;
+    if (count > 0) {
+        memcpy(loaded.position, fields[0]->data, count * sizeof *loaded.position);
+        memcpy(loaded.velocity, fields[1]->data, count * sizeof *loaded.velocity);
+        memcpy(loaded.id, fields[2]->data, count * sizeof *loaded.id);
+        memcpy(loaded.birth, fields[3]->data, count * sizeof *loaded.birth);
+        memcpy(loaded.removed, fields[4]->data, count * sizeof *loaded.removed);
+    }
+    loaded.count = (uint32_t)count;
+    ghosts_free(ghosts);
+    *ghosts = loaded;
+    return true;
 }
 
 void ghosts_free(Ghosts *ghosts) {

@@ -154,8 +154,10 @@ SkiffBlockDef skiff_block_default(void) {
 }
 
 SkiffBodyDef skiff_body_default(void) {
-    return (SkiffBodyDef){
-        .geometry = skiff_geometry_default(), .density = 1000.0f, .free_axes = SKIFF_FREE_ALL};
+    return (SkiffBodyDef){.geometry = skiff_geometry_default(),
+                          .density = 1000.0f,
+                          .free_axes = SKIFF_FREE_ALL,
+                          .stop_time = INFINITY};
 }
 
 SkiffDriveDef skiff_drive_default(void) {

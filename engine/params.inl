@@ -56,6 +56,7 @@ PARAM_FLOAT(rest_density_error, "restMaxError", 0.05f, 1e-6f, 10.0f, "%", "Filli
 PARAM_FLOAT(rest_softening, "restSoftening", 1.0f, 0.01f, 1.0f, "", "Filling: share of a density error that one step of the stabilisation corrects")
 PARAM_BOOL(rest_divergence, "restDivergence", true, "Filling: steps of the stabilisation have a divergence solve")
 PARAM_INT(sea_steps, "seaSteps", 160, 0, 10000, "", "Sea: most steps in which its water settles before it is kept")
+PARAM_ENUM(window_edge, "windowEdge", 1, "walls|water", "Window: what stands still around one that moves: walls, as the paper, or water at rest one support wide, which takes its place when the window arrives; a window that does not move has walls")
 PARAM_FLOAT(window_trigger, "windowTrigger", 2.5f, 0.1f, 100.0f, "h", "Window: it moves when what it follows is farther from its middle")
 PARAM_FLOAT(window_cap, "windowCap", 3.5f, 0.1f, 100.0f, "h", "Window: it moves by at most this")
 PARAM_FLOAT(window_old, "windowOld", 3.0f, 0.0f, 100.0f, "r", "Window: water closer to the old edge is left behind")

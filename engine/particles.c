@@ -47,6 +47,10 @@ void *particles_data(Particles *particles, ParticleFieldId field) {
 static void permute_field(const ParticleFieldInfo *info, const void *from, void *to, const uint32_t *order,
                           uint32_t begin, uint32_t end) {
     switch (info->size) {
+    case 1:
+        for (uint32_t k = begin; k < end; k++)
+            ((uint8_t *)to)[k] = ((const uint8_t *)from)[order[k]];
+        break;
     case 4:
         for (uint32_t k = begin; k < end; k++)
             ((uint32_t *)to)[k] = ((const uint32_t *)from)[order[k]];
@@ -96,5 +100,6 @@ uint32_t particles_append(Particles *particles, const float position[3], const f
     particles->pressure[i] = particles->pressure_divergence[i] = particles->prediction[i] = 0.0f;
     particles->id[i] = particles->next_id++;
     particles->birth[i] = birth;
+    particles->edge[i] = EDGE_NONE;
     return i;
 }

@@ -14,6 +14,9 @@ typedef enum ParticleFieldId {
     PARTICLE_FIELD_COUNT
 } ParticleFieldId;
 
+/* Water that stands still around a window, in place of a wall: as it was laid, or caught as it came. */
+typedef enum ParticleEdge { EDGE_NONE, EDGE_LAID, EDGE_CAUGHT } ParticleEdge;
+
 typedef struct Particles {
     uint32_t count;
     uint32_t capacity; /* multiple of BLOCK */
@@ -25,6 +28,7 @@ typedef struct Particles {
     float *prediction;
     uint64_t *id;
     double *birth;
+    uint8_t *edge;
     Buffer front[PARTICLE_FIELD_COUNT], back[PARTICLE_FIELD_COUNT];
 } Particles;
 

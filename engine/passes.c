@@ -40,63 +40,76 @@ static inline void pair_kernel(const Kernel *kernel, Vf distance_sq, Vf *factor,
     *weight = vf_mul(vf_set(kernel->w_scale), vf_select(far, far_weight, near_weight));
 }
 
+static inline float near_distance_sq(const Kernel *kernel) {
+    const float distance = NEAR_SUPPORT * kernel->support;
+    return distance * distance;
+}
+
 /* ---- Neighbour search ---- */
 
-typedef struct Candidates {
-    int count;
-    int self_shift; /* place of particle i of the centre column's run is i + self_shift */
-} Candidates;
+/* The cell whose candidates lie in scratch. */
+typedef struct SearchCell {
+    uint32_t index;
+    int candidate_count;
+} SearchCell;
 
-/* Copies the particles of the 27 cells around `cell` into scratch, run by run. */
-static bool gather_candidates(const SearchJob *job, uint32_t cell, Scratch *scratch, Candidates *candidates) {
+/* Copies the particles of the 27 cells around `cell` into scratch, run by run, and fills the last lanes with
+ * points that are near nothing. Returns how many there are, -1 for too many. */
+static int gather_candidates(const SearchJob *job, uint32_t cell, Scratch *scratch) {
     const CellGrid *grid = job->grid;
     const int32_t column = grid->size[1], slab = grid->size[1] * grid->size[2];
     int n = 0;
-    for (int dx = -1; dx <= 1; dx++) {
-        for (int dz = -1; dz <= 1; dz++) {
-            const int64_t middle = (int64_t)cell + dx * slab + dz * column;
-            const uint32_t begin = grid->start[middle - 1], end = grid->start[middle + 2];
-            if (n + (int64_t)(end - begin) > MAX_CANDIDATES)
-                return false;
-            if (dx == 0 && dz == 0)
-                candidates->self_shift = n - (int)begin;
-            for (uint32_t j = begin; j < end; j += LANES) {
-                Vf x, y, z, unused;
-                vf_load4(job->position + j, &x, &y, &z, &unused);
-                const int to = n + (int)(j - begin);
-                vf_store(scratch->x + to, x);
-                vf_store(scratch->y + to, y);
-                vf_store(scratch->z + to, z);
-                vi_store(scratch->index + to, vi_add(vi_set((int32_t)j), vi_lane()));
-            }
-            n += (int)(end - begin);
+    for (int run = 0; run < 9; run++) {
+        const int64_t middle = (int64_t)cell + (run / 3 - 1) * slab + (run % 3 - 1) * column;
+        const uint32_t begin = grid->start[middle - 1], end = grid->start[middle + 2];
+        if (n + (int64_t)(end - begin) > MAX_CANDIDATES)
+            return -1;
+        for (uint32_t j = begin; j < end; j += LANES) {
+            Vf x, y, z, unused;
+            vf_load4(job->position + j, &x, &y, &z, &unused);
+            const int to = n + (int)(j - begin);
+            vf_store(scratch->x + to, x);
+            vf_store(scratch->y + to, y);
+            vf_store(scratch->z + to, z);
+            const Vi index = vi_add(vi_set((int32_t)j), vi_lane());
+            vi_store(scratch->halves + to, vi_add(index, index));
         }
+        n += (int)(end - begin);
     }
-    candidates->count = n;
-    return true;
+    vf_store(scratch->x + n, vf_set(1e18f));
+    return n;
 }
 
-/* Neighbours of particle i in the order of the candidates; -1 when there are too many. */
-static int find_neighbours(const SearchJob *job, const Candidates *candidates, uint32_t i,
-                           const Scratch *scratch, int32_t *list) {
+typedef struct NeighbourCount {
+    int all, near;
+} NeighbourCount;
+
+/* Neighbours of particle i in the order of the candidates, the near ones first; all is -1 when there are too
+ * many. */
+static NeighbourCount find_neighbours(const SearchJob *job, int candidate_count, uint32_t i, Scratch *scratch,
+                                      int32_t *list) {
     const Vf x = vf_set(job->position[i][0]), y = vf_set(job->position[i][1]),
              z = vf_set(job->position[i][2]);
     const Vf limit = vf_set(job->kernel.support * job->kernel.support);
-    const int self = (int)i + candidates->self_shift;
-    int n = 0;
-    for (int c = 0; c < candidates->count; c += LANES) {
+    const Vf near_limit = vf_set(near_distance_sq(&job->kernel));
+    const Vi self = vi_set((int32_t)(2 * i));
+    int near = 0, far = 0;
+    for (int c = 0; c < candidate_count; c += LANES) {
         const Vf dx = vf_sub(x, vf_load(scratch->x + c));
         const Vf dy = vf_sub(y, vf_load(scratch->y + c));
         const Vf dz = vf_sub(z, vf_load(scratch->z + c));
         const Vf distance_sq = vf_fma(dx, dx, vf_fma(dy, dy, vf_mul(dz, dz)));
-        uint32_t valid = candidates->count - c >= LANES ? 0xffffu : (1u << (candidates->count - c)) - 1u;
-        if ((unsigned)(self - c) < LANES)
-            valid &= ~(1u << (self - c));
-        n += vi_compress(list + n, scratch->index + c, (Vm)(vf_less(distance_sq, limit) & valid));
-        if (n > MAX_NEIGHBOURS)
-            return -1;
+        const Vm is_near = vf_less(distance_sq, near_limit);
+        const Vm is_far = vf_less(distance_sq, limit) & (Vm)~is_near;
+        const Vm is_self = vi_equal(vi_load(scratch->halves + c), self);
+        near += vi_compress(list + near, scratch->halves + c, is_near & (Vm)~is_self);
+        far += vi_compress(scratch->far + far, scratch->halves + c, is_far);
+        if (near + far > MAX_NEIGHBOURS)
+            return (NeighbourCount){-1, 0};
     }
-    return n;
+    for (int k = 0; k < far; k += LANES)
+        vi_store(list + near + k, vi_load(scratch->far + k));
+    return (NeighbourCount){near + far, near};
 }
 
 static inline uint16_t *entry_factor(const uint8_t *entries, uint32_t entry, bool wide) {
@@ -129,28 +142,24 @@ static inline Vf entry_store_factor(uint8_t *entries, uint32_t entry, bool wide,
 
 /* Turns the sixteen lists in scratch into row entries, densities and gradient sums. True if all offsets fit
  * 16 bits or wide. */
-static bool pack_slice(const SearchJob *job, uint32_t first, const int32_t counts[SLICE], int length,
-                       uint32_t entry, const Scratch *scratch) {
-    const int32_t stride = MAX_NEIGHBOURS + LANES;
-    int32_t row_starts[SLICE];
-    for (int l = 0; l < SLICE; l++)
-        row_starts[l] = l * stride;
-    const Vi row_start = vi_load(row_starts), count = vi_load(counts);
-    const Vi own = vi_add(vi_set((int32_t)first), vi_lane());
+static bool pack_slice(const SearchJob *job, uint32_t first, const int32_t counts[SLICE],
+                       const SliceRows *rows, const Scratch *scratch) {
+    const Vi count = vi_load(counts), minus_first = vi_set(-2 * (int32_t)first);
     Vf x, y, z, w;
     vf_load4(job->position + first, &x, &y, &z, &w);
     Vf sum_x = vf_zero(), sum_y = vf_zero(), sum_z = vf_zero(), sum_sq = vf_zero(), sum_w = vf_zero();
     Vm misfit = 0;
-    for (int k = 0; k < length; k++, entry++) {
+    int32_t halves[SLICE][SLICE]; /* of the next sixteen entries, from the first particle of all */
+    uint32_t entry = rows->start;
+    for (int k = 0; k < rows->length; k++, entry++) {
+        if (k % SLICE == 0)
+            vi_transpose16(scratch->list[0] + k, MAX_NEIGHBOURS + LANES, halves);
         const Vm valid = vi_less(vi_set(k), count);
-        const Vi index = vi_select(valid, vi_gather(scratch->list[0] + k, row_start), own);
-        const Vi offset = vi_add(index, vi_set(-(int32_t)first)), place = vi_add(offset, offset);
+        const Vi place = vi_add(vi_load(halves[k % SLICE]), minus_first);
         misfit |= vi_less(place, vi_set(INT16_MIN)) | vi_less(vi_set(INT16_MAX), place);
         entry_store_place(job->entries, entry, job->wide, place);
-        int32_t places[SLICE]; /* not those stored: what does not fit leads anywhere */
-        vi_store(places, place);
         Vf nx, ny, nz;
-        vf_gather4_i32(job->position + first, places, &nx, &ny, &nz, &w);
+        vf_gather4_i32(job->position, halves[k % SLICE], &nx, &ny, &nz, &w);
         const Vf dx = vf_sub(x, nx), dy = vf_sub(y, ny), dz = vf_sub(z, nz);
         const Vf distance_sq = vf_fma(dx, dx, vf_fma(dy, dy, vf_mul(dz, dz)));
         Vf factor, weight;
@@ -172,34 +181,52 @@ static bool pack_slice(const SearchJob *job, uint32_t first, const int32_t count
     return job->wide || misfit == 0;
 }
 
+/* Lists the neighbours of a slice's particles in scratch, all to the length of the longest: what is missing
+ * is the particle itself. all is -1, and *fault the particle, when one has too many. */
+static NeighbourCount list_neighbours(const SearchJob *job, uint32_t first, SearchCell *cell,
+                                      Scratch *scratch, int32_t counts[SLICE], uint32_t *fault) {
+    NeighbourCount most = {0, 0};
+    for (uint32_t l = 0; l < SLICE; l++) {
+        const uint32_t i = first + l;
+        counts[l] = 0;
+        if (i >= job->count)
+            continue;
+        job->neighbours[i] = 0;
+        if (job->frozen != NULL && job->frozen[i])
+            continue;
+        NeighbourCount found = {-1, 0};
+        if (job->cell[i] != cell->index) {
+            cell->index = job->cell[i];
+            cell->candidate_count = gather_candidates(job, cell->index, scratch);
+        }
+        if (cell->candidate_count >= 0)
+            found = find_neighbours(job, cell->candidate_count, i, scratch, scratch->list[l]);
+        if (found.all < 0) {
+            *fault = i;
+            return found;
+        }
+        counts[l] = found.all;
+        job->neighbours[i] = (uint16_t)found.all;
+        most.all = found.all > most.all ? found.all : most.all;
+        most.near = found.near > most.near ? found.near : most.near;
+    }
+    for (uint32_t l = 0; l < SLICE; l++)
+        for (int k = counts[l]; k < most.all; k += LANES)
+            vi_store(scratch->list[l] + k, vi_set((int32_t)(2 * (first + l))));
+    return most;
+}
+
 static int search(const SearchJob *job, uint32_t block, int thread, Scratch *scratch, uint32_t *fault) {
-    uint32_t current_cell = UINT32_MAX;
-    Candidates candidates = {0};
+    SearchCell cell = {.index = UINT32_MAX};
     int status = SEARCH_OK;
     for (uint32_t slice = block * BLOCK_SLICES; slice < (block + 1) * BLOCK_SLICES; slice++) {
         const uint32_t first = slice * SLICE;
-        int32_t counts[SLICE] = {0};
-        int length = 0;
-        for (uint32_t l = 0; l < SLICE && first + l < job->count; l++) {
-            const uint32_t i = first + l;
-            bool fits = true;
-            job->neighbours[i] = 0;
-            if (job->frozen != NULL && job->frozen[i])
-                continue;
-            if (job->cell[i] != current_cell) {
-                current_cell = job->cell[i];
-                fits = gather_candidates(job, current_cell, scratch, &candidates);
-            }
-            counts[l] = fits ? find_neighbours(job, &candidates, i, scratch, scratch->list[l]) : -1;
-            if (counts[l] < 0) {
-                *fault = i;
-                return SEARCH_TOO_DENSE;
-            }
-            job->neighbours[i] = (uint16_t)counts[l];
-            length = counts[l] > length ? counts[l] : length;
-        }
-        job->slice_length[slice] = (uint16_t)length;
-        job->slice_start[slice] = 0;
+        int32_t counts[SLICE];
+        const NeighbourCount found = list_neighbours(job, first, &cell, scratch, counts, fault);
+        if (found.all < 0)
+            return SEARCH_TOO_DENSE;
+        SliceRows *rows = &job->slices[slice];
+        *rows = (SliceRows){.length = (uint16_t)found.all, .near = (uint16_t)found.near};
         if (first >= job->count) {
             for (uint32_t i = first; i < first + SLICE; i++) {
                 memset(job->gradient_sum[i], 0, sizeof(Float4));
@@ -207,11 +234,10 @@ static int search(const SearchJob *job, uint32_t block, int thread, Scratch *scr
             }
             continue;
         }
-        const uint32_t entry = job->allocate(job->rows, thread, (uint32_t)length);
-        if (entry == UINT32_MAX)
+        rows->start = job->allocate(job->rows, thread, rows->length);
+        if (rows->start == UINT32_MAX)
             return SEARCH_NEEDS_MEMORY;
-        job->slice_start[slice] = entry;
-        if (!pack_slice(job, first, counts, length, entry, scratch))
+        if (!pack_slice(job, first, counts, rows, scratch))
             status = SEARCH_NEEDS_WIDE;
     }
     return status;
@@ -376,11 +402,11 @@ static inline void accelerate_slices(const PairData *pairs, const AccelerateJob 
                                      const bool wide) {
     const Vf unit = vf_set(-job->scale * pairs->factor_unit), scale = vf_set(job->scale);
     for (uint32_t slice = block * BLOCK_SLICES; slice < (block + 1) * BLOCK_SLICES; slice++) {
-        const uint32_t first = slice * SLICE, begin = pairs->slice_start[slice];
+        const uint32_t first = slice * SLICE, begin = pairs->slices[slice].start;
         const Float4 *slice_operand = job->operand + first;
         Vf own_x, own_y, own_z, own_p, x = vf_zero(), y = vf_zero(), z = vf_zero();
         vf_load4(slice_operand, &own_x, &own_y, &own_z, &own_p);
-        for (uint32_t entry = begin; entry < begin + pairs->slice_length[slice]; entry++) {
+        for (uint32_t entry = begin; entry < begin + pairs->slices[slice].length; entry++) {
             prefetch_entry(pairs->entries, entry + PREFETCH_ENTRIES, wide);
             Vf nx, ny, nz, p;
             gather_neighbours(slice_operand, pairs->entries, entry, wide, &nx, &ny, &nz, &p);
@@ -413,10 +439,10 @@ static void accelerate(const PairData *pairs, const AccelerateJob *job, uint32_t
 static inline void divergence_slices(const PairData *pairs, const Float4 *v, float *result, uint32_t block,
                                      const bool wide) {
     for (uint32_t slice = block * BLOCK_SLICES; slice < (block + 1) * BLOCK_SLICES; slice++) {
-        const uint32_t first = slice * SLICE, begin = pairs->slice_start[slice];
+        const uint32_t first = slice * SLICE, begin = pairs->slices[slice].start;
         const Float4 *slice_v = v + first;
         Vf sum_x = vf_zero(), sum_y = vf_zero(), sum_z = vf_zero(), moments = vf_zero(), x, y, z, moment;
-        for (uint32_t entry = begin; entry < begin + pairs->slice_length[slice]; entry++) {
+        for (uint32_t entry = begin; entry < begin + pairs->slices[slice].length; entry++) {
             prefetch_entry(pairs->entries, entry + PREFETCH_ENTRIES, wide);
             gather_neighbours(slice_v, pairs->entries, entry, wide, &x, &y, &z, &moment);
             const Vf factor = vf_load_u16(entry_factor(pairs->entries, entry, wide));
@@ -450,15 +476,18 @@ static inline Vf vf_load_weight(const PairData *pairs, uint32_t entry) {
     return vf_load_i16(pairs->weights + (size_t)entry * SLICE);
 }
 
-/* Distances x_j - x_i of a slice's neighbours in units of the support radius. */
+/* Distances x_j - x_i of a slice's neighbours in units of the support radius. The weight of those that are
+ * not near becomes 0: the same for both of a pair, wherever they stand in their rows. */
 static inline void gather_arms(const PairData *pairs, uint32_t entry, const Float4 *slice_position,
-                               const Vf own[3], Vf arm[3]) {
-    Vf x, y, z, unused;
-    gather_neighbours(slice_position, pairs->entries, entry, pairs->wide, &x, &y, &z, &unused);
-    const Vf unit = vf_set(pairs->kernel.inv_support);
-    arm[0] = vf_mul(unit, vf_sub(x, own[0]));
-    arm[1] = vf_mul(unit, vf_sub(y, own[1]));
-    arm[2] = vf_mul(unit, vf_sub(z, own[2]));
+                               const Vf own[3], Vf arm[3], Vf *weight) {
+    Vf unused;
+    gather_neighbours(slice_position, pairs->entries, entry, pairs->wide, &arm[0], &arm[1], &arm[2], &unused);
+    for (int k = 0; k < 3; k++)
+        arm[k] = vf_sub(arm[k], own[k]);
+    const Vf distance_sq = vf_fma(arm[0], arm[0], vf_fma(arm[1], arm[1], vf_mul(arm[2], arm[2])));
+    *weight = vf_mask(vf_less(distance_sq, vf_set(near_distance_sq(&pairs->kernel))), *weight);
+    for (int k = 0; k < 3; k++)
+        arm[k] = vf_mul(vf_set(pairs->kernel.inv_support), arm[k]);
 }
 
 /* A = [sum w (v_j - v_i) d^T] [sum w d d^T + small I]^-1, w = W_ij / W(0), d in supports. `small` keeps the
@@ -467,7 +496,7 @@ static void strain(const StrainJob *job, uint32_t block) {
     const PairData *pairs = job->pairs;
     const Vf small = vf_set(0.008f * 32767.0f);
     for (uint32_t slice = block * BLOCK_SLICES; slice < (block + 1) * BLOCK_SLICES; slice++) {
-        const uint32_t first = slice * SLICE, begin = pairs->slice_start[slice];
+        const uint32_t first = slice * SLICE, begin = pairs->slices[slice].start;
         Vf own_x[3], own_v[3], unused;
         vf_load4(pairs->position + first, &own_x[0], &own_x[1], &own_x[2], &unused);
         vf_load4(job->velocity + first, &own_v[0], &own_v[1], &own_v[2], &unused);
@@ -476,14 +505,14 @@ static void strain(const StrainJob *job, uint32_t block) {
         for (int r = 0; r < 3; r++)
             for (int c = 0; c < 3; c++)
                 b[r][c] = vf_zero();
-        for (uint32_t entry = begin; entry < begin + pairs->slice_length[slice]; entry++) {
+        for (uint32_t entry = begin; entry < begin + pairs->slices[slice].near; entry++) {
             __builtin_prefetch(pairs->weights + (size_t)(entry + PREFETCH_ENTRIES) * SLICE);
             prefetch_entry(pairs->entries, entry + PREFETCH_ENTRIES, pairs->wide);
             Vf d[3], v[3], wd[3];
-            gather_arms(pairs, entry, pairs->position + first, own_x, d);
+            Vf weight = vf_load_weight(pairs, entry);
+            gather_arms(pairs, entry, pairs->position + first, own_x, d, &weight);
             gather_neighbours(job->velocity + first, pairs->entries, entry, pairs->wide, &v[0], &v[1], &v[2],
                               &unused);
-            const Vf weight = vf_load_weight(pairs, entry);
             for (int k = 0; k < 3; k++) {
                 v[k] = vf_sub(v[k], own_v[k]);
                 wd[k] = vf_mul(weight, d[k]);
@@ -524,7 +553,7 @@ static inline void calm_pair(const ForceJob *job, uint32_t entry, uint32_t first
                              const Vf own_a[3][3], Vf weight, Vf e[3], Vf sum[3]) {
     const PairData *pairs = job->pairs;
     Vf d[3], unused, size = vf_set(1e-12f);
-    gather_arms(pairs, entry, pairs->position + first, own_x, d);
+    gather_arms(pairs, entry, pairs->position + first, own_x, d, &weight);
     const Vf half = vf_set(0.5f);
     for (int c = 0; c < 3; c++) {
         Vf a[3];
@@ -547,46 +576,49 @@ static inline void calm_pair(const ForceJob *job, uint32_t entry, uint32_t first
  * positions costs twice this pass. Calming does the same to what is left of the difference when the linear
  * fields around both are taken out, so that it meets disorder and spares waves; being antisymmetric in the
  * two as well it keeps momentum too. */
-static inline void forces_slices(const ForceJob *job, uint32_t block, const bool calm) {
+static inline Vf viscous_pair(const ForceJob *job, uint32_t entry, uint32_t first, const Vf own_v[3], Vf e[3],
+                              Vf sum[3]) {
+    const PairData *pairs = job->pairs;
+    __builtin_prefetch(pairs->weights + (size_t)(entry + PREFETCH_ENTRIES) * SLICE);
+    prefetch_entry(pairs->entries, entry + PREFETCH_ENTRIES, pairs->wide);
+    Vf unused;
+    gather_neighbours(job->velocity + first, pairs->entries, entry, pairs->wide, &e[0], &e[1], &e[2],
+                      &unused);
+    const Vf weight = vf_load_weight(pairs, entry);
+    for (int k = 0; k < 3; k++) {
+        e[k] = vf_sub(own_v[k], e[k]);
+        sum[k] = vf_fma(weight, e[k], sum[k]);
+    }
+    return weight;
+}
+
+static void forces(const ForceJob *job, uint32_t block) {
     const PairData *pairs = job->pairs;
     const Vf unit = vf_set(-pairs->volume * pairs->kernel.w_scale / 32767.0f);
     const Vf viscous = vf_mul(unit, vf_set(job->viscosity)), calming = vf_mul(unit, vf_set(job->calming));
     for (uint32_t slice = block * BLOCK_SLICES; slice < (block + 1) * BLOCK_SLICES; slice++) {
-        const uint32_t first = slice * SLICE, begin = pairs->slice_start[slice];
-        Vf own_v[3], own_x[3], own_a[3][3], unused;
+        const uint32_t first = slice * SLICE;
+        const SliceRows *rows = &pairs->slices[slice];
+        const uint32_t near_end = rows->start + (job->calming > 0.0f ? rows->near : 0);
+        const uint32_t end = job->viscosity > 0.0f ? rows->start + rows->length : near_end;
+        Vf own_v[3], own_x[3], own_a[3][3], e[3], unused;
         Vf sum[3] = {vf_zero(), vf_zero(), vf_zero()}, calm_sum[3] = {vf_zero(), vf_zero(), vf_zero()};
         vf_load4(job->velocity + first, &own_v[0], &own_v[1], &own_v[2], &unused);
         vf_load4(pairs->position + first, &own_x[0], &own_x[1], &own_x[2], &unused);
-        for (int c = 0; calm && c < 3; c++)
+        for (int c = 0; job->calming > 0.0f && c < 3; c++)
             vf_load4(job->gradient[c] + first, &own_a[c][0], &own_a[c][1], &own_a[c][2], &unused);
-        const uint32_t length = job->viscosity > 0.0f || calm ? pairs->slice_length[slice] : 0;
-        for (uint32_t entry = begin; entry < begin + length; entry++) {
-            __builtin_prefetch(pairs->weights + (size_t)(entry + PREFETCH_ENTRIES) * SLICE);
-            prefetch_entry(pairs->entries, entry + PREFETCH_ENTRIES, pairs->wide);
-            Vf e[3];
-            gather_neighbours(job->velocity + first, pairs->entries, entry, pairs->wide, &e[0], &e[1], &e[2],
-                              &unused);
-            const Vf weight = vf_load_weight(pairs, entry);
-            for (int k = 0; k < 3; k++) {
-                e[k] = vf_sub(own_v[k], e[k]);
-                sum[k] = vf_fma(weight, e[k], sum[k]);
-            }
-            if (calm)
-                calm_pair(job, entry, first, own_x, own_a, weight, e, calm_sum);
+        uint32_t entry = rows->start;
+        for (; entry < near_end; entry++) {
+            const Vf weight = viscous_pair(job, entry, first, own_v, e, sum);
+            calm_pair(job, entry, first, own_x, own_a, weight, e, calm_sum);
         }
-        for (int k = 0; k < 3; k++) {
-            sum[k] = vf_fma(viscous, sum[k], vf_add(own_v[k], vf_set(job->gravity_dt[k])));
-            sum[k] = calm ? vf_fma(calming, calm_sum[k], sum[k]) : sum[k];
-        }
+        for (; entry < end; entry++)
+            viscous_pair(job, entry, first, own_v, e, sum);
+        for (int k = 0; k < 3; k++)
+            sum[k] = vf_fma(calming, calm_sum[k],
+                            vf_fma(viscous, sum[k], vf_add(own_v[k], vf_set(job->gravity_dt[k]))));
         vf_store4(job->result + first, sum[0], sum[1], sum[2], vf_zero());
     }
-}
-
-static void forces(const ForceJob *job, uint32_t block) {
-    if (job->calming > 0.0f)
-        forces_slices(job, block, true);
-    else
-        forces_slices(job, block, false);
 }
 
 const Passes PASSES_JOIN(passes_, PASSES_ISA) = {

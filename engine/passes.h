@@ -79,10 +79,22 @@ typedef struct SampleSet {
 /* Scratch of one thread; too large for the stack. */
 typedef struct Scratch {
     float x[MAX_CANDIDATES + LANES], y[MAX_CANDIDATES + LANES], z[MAX_CANDIDATES + LANES];
-    int32_t index[MAX_CANDIDATES + LANES];
+    int32_t halves[MAX_CANDIDATES + LANES]; /* places of the candidates as vf_gather4_i32 takes them */
     int32_t list[SLICE][MAX_NEIGHBOURS + LANES];
+    int32_t far[MAX_NEIGHBOURS + LANES];
     Contact contacts[BLOCK * MAX_CONTACT_OBJECTS];
 } Scratch;
+
+/* Entries of a slice. Neighbours nearer than NEAR_SUPPORT come first: of every particle they are among the
+ * first `near` entries, which may hold others as well. */
+typedef struct SliceRows {
+    uint32_t start;
+    uint16_t length, near;
+} SliceRows;
+
+/* In supports: the first shell of water at rest, 12 of 36 neighbours, and seven eighths of the sum of W_ij.
+ */
+#define NEAR_SUPPORT 0.68f
 
 /* What every pair pass reads. Arrays are padded to whole blocks. */
 typedef struct PairData {
@@ -92,10 +104,9 @@ typedef struct PairData {
     float factor_unit; /* value of 1 in RowEntry.factor, 1/m^2 */
     float centre[3];   /* m; middle of the particles: moments x . v are taken about it */
     bool wide;
-    const uint8_t *entries;      /* RowEntry or RowEntryWide */
-    const int16_t *weights;      /* [entries][SLICE] W_ij in units of W(0) / 32767; 0 in unused places */
-    const uint32_t *slice_start; /* first entry of a slice */
-    const uint16_t *slice_length;
+    const uint8_t *entries; /* RowEntry or RowEntryWide */
+    const int16_t *weights; /* [entries][SLICE] W_ij in units of W(0) / 32767; 0 in unused places */
+    const SliceRows *slices;
     const Float4 *position;
     const float *density;       /* rho / rho0 */
     const Float4 *gradient_sum; /* G_i = sum_j V grad W_ij + g_i; [3]: diagonal of D D^T */
@@ -132,8 +143,7 @@ typedef struct SearchJob {
     uint8_t *entries;
     int16_t *weights;
     const uint8_t *frozen; /* NULL, or [particles] 1: gets no row, and density and gradient sum of none */
-    uint32_t *slice_start;
-    uint16_t *slice_length;
+    SliceRows *slices;
     float *density;
     Float4 *gradient_sum; /* sum_j V grad W_ij, 1/m; [3]: sum of their squares */
     uint16_t *neighbours;

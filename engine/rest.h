@@ -30,6 +30,8 @@ enum { REST_PROTECTOR_MARKED, REST_PROTECTOR_DENSER, REST_PROTECTOR_PRINTED };
 enum { REST_SCHEDULE_CONSTANT, REST_SCHEDULE_PRINTED };
 enum { REST_SETTLE_ALL, REST_SETTLE_CANDIDATES, REST_SETTLE_SHELL };
 
+struct SkiffSim;
+
 /* Where water shall be. All of it window-local. */
 /* STILL: water that is known to touch nothing it does not fit. */
 typedef enum RestPlace { REST_OUTSIDE, REST_IN_WATER, REST_STILL, REST_IN_AIR } RestPlace;
@@ -51,6 +53,8 @@ typedef struct RestRequest {
     const RestFitted *fitted; /* NULL: the tile, shifted by `offset` (m, world) */
     double offset[3];
     double birth; /* s, of the new particles */
+    /* NULL, or: marks the edge of a window among the new particles, from `first` on, before they settle. */
+    void (*mark_edge)(struct SkiffSim *sim, uint32_t first);
 } RestRequest;
 
 /* The points of a fill and what the stages need. Kept from fill to fill for its memory. */
@@ -70,17 +74,22 @@ typedef struct RestCloud {
     Buffer whence[2];                                   /* where existing water stands in `kept` */
 } RestCloud;
 
-struct SkiffSim;
-
 /* Fills and appends the new particles to the simulation's. False: no memory, or the water is too dense
  * anywhere; the simulation's particles are as they were. */
 bool rest_fill(struct SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err);
 void rest_cloud_free(RestCloud *cloud);
 
+/* Loads the tile of water at rest unless it is there; false when it is not made for the scene's volumeFactor.
+ */
+bool rest_check_tile(struct SkiffSim *sim, Err *err);
+
 /* The stages of rest_fill. */
 bool rest_gather(struct SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err);
 bool rest_select(struct SkiffSim *sim, SkiffFill *fill, Err *err);
 bool rest_settle(struct SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err);
+/* The simulation's particles are a column of water, x and z in [0, period), that goes on periodically: all
+ * but the edge settles. */
+bool rest_settle_column(struct SkiffSim *sim, double period, SkiffFill *fill, Err *err);
 /* Sorts the cloud, freezes what is of no kind in `evaluated` (bits 1 << RestKind), and makes rows and
  * boundary terms of the rest. */
 bool rest_search(struct SkiffSim *sim, uint32_t evaluated, Err *err);

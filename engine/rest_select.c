@@ -35,9 +35,9 @@ typedef struct Select {
 
 int rest_row(const PairData *pairs, uint32_t i, RestNeighbour *row) {
     const uint32_t slice = i / SLICE, lane = i % SLICE, first = slice * SLICE;
-    const uint32_t begin = pairs->slice_start[slice];
+    const uint32_t begin = pairs->slices[slice].start;
     int count = 0;
-    for (uint32_t entry = begin; entry < begin + pairs->slice_length[slice]; entry++) {
+    for (uint32_t entry = begin; entry < begin + pairs->slices[slice].length; entry++) {
         const int32_t weight = pairs->weights[(size_t)entry * SLICE + lane];
         if (weight == 0)
             continue;

@@ -33,10 +33,15 @@ static const float HELD_SHARE = 0.15f;
 /* Of what two particles lack to the distance of a radius, the share that each moves a step. */
 static const float PART_SHARE = 0.1f;
 
+/* Share of a density error that a step corrects, and of the velocity that it keeps, while a column settles.
+ */
+static const float COLUMN_SOFTENING = 0.25f, COLUMN_RETENTION = 0.8f;
+enum { COLUMN_STEPS = 6000 };
+
 /* What settles, and with what. */
 typedef struct Settle {
     SkiffSim *sim;
-    SkiffParams params; /* the simulation's, changed for the purpose by run_steps */
+    SkiffParams params; /* the simulation's, changed for the purpose */
     Particles *particles;
     Grid *grid;
     Rows *rows;
@@ -46,8 +51,11 @@ typedef struct Settle {
     const uint8_t *held;   /* [particles] 1: does not move; or NULL */
     uint32_t active;
     int steps;     /* at most */
+    bool layer;    /* only what is beside solids and existing water: in the cloud */
     bool yields;   /* existing water beside the new moves too */
+    bool tracks;   /* where existing water was before the sorts: RestCloud.whence */
     float surface; /* y, m */
+    double period; /* of a column, m */
 } Settle;
 
 /* ---- Search ---- */
@@ -73,6 +81,8 @@ static bool settle_rows(Settle *settle, Err *err) {
 static Settle settle_cloud(SkiffSim *sim) {
     RestCloud *cloud = &sim->rest;
     return (Settle){.sim = sim,
+                    .params = sim->params,
+                    .layer = true,
                     .particles = &cloud->points,
                     .grid = &cloud->grid,
                     .rows = &cloud->rows,
@@ -80,6 +90,18 @@ static Settle settle_cloud(SkiffSim *sim) {
                     .dfsph = &cloud->dfsph,
                     .frozen = cloud->frozen.data,
                     .held = cloud->held.data};
+}
+
+static Settle settle_all(SkiffSim *sim, float surface, uint32_t active) {
+    return (Settle){.sim = sim,
+                    .params = sim->params,
+                    .particles = &sim->particles,
+                    .grid = &sim->grid,
+                    .rows = &sim->rows,
+                    .boundary = &sim->boundary,
+                    .dfsph = &sim->dfsph,
+                    .active = active,
+                    .surface = surface};
 }
 
 bool rest_search(SkiffSim *sim, uint32_t evaluated, Err *err) {
@@ -194,27 +216,79 @@ static void let_go(const Settle *settle, const uint8_t *held, uint8_t *wider) {
         wider[i] = held[i] && !beside_moving(settle, held, i);
 }
 
-static bool search_all(Settle *settle, uint64_t first_id, Err *err) {
+static void track_existing(Settle *settle) {
     RestCloud *cloud = &settle->sim->rest;
-    if (!settle_sort(settle, err) || !settle_rows(settle, err))
-        return false;
-    if (settle->held == NULL)
-        return true;
-    uint8_t *held = cloud->held.data, *wider = cloud->frozen.data;
     const uint32_t *from = cloud->whence[0].data, *order = settle->grid->order;
     uint32_t *to = cloud->whence[1].data;
-    for (uint32_t i = 0; i < settle->particles->count; i++) {
+    for (uint32_t i = 0; i < settle->particles->count; i++)
         to[i] = from[order[i]];
-        held[i] = settle->particles->id[i] < first_id;
-    }
     const Buffer swap = cloud->whence[0];
     cloud->whence[0] = cloud->whence[1];
     cloud->whence[1] = swap;
-    if (settle->yields) {
+}
+
+static bool search_all(Settle *settle, uint64_t first_id, Err *err) {
+    if (!settle_sort(settle, err))
+        return false;
+    const Particles *particles = settle->particles;
+    settle->frozen = particles->edge;
+    if (!settle_rows(settle, err))
+        return false;
+    if (settle->tracks)
+        track_existing(settle);
+    RestCloud *cloud = &settle->sim->rest;
+    uint8_t *held = cloud->held.data, *wider = cloud->frozen.data;
+    for (uint32_t i = 0; i < particles->count; i++)
+        held[i] = particles->id[i] < first_id || particles->edge[i] != EDGE_NONE;
+    if (settle->tracks && settle->yields) { /* the edge has no rows, and so stays held */
         let_go(settle, held, wider);
         let_go(settle, wider, held);
     }
     return true;
+}
+
+/* Drops the last step's copies of the column and wraps what has moved out of it. */
+static void wrap_column(Settle *settle, uint32_t *order) {
+    Particles *particles = settle->particles;
+    const float period = (float)settle->period;
+    uint32_t kept = 0;
+    for (uint32_t i = 0; i < particles->count; i++)
+        if (particles->edge[i] != EDGE_CAUGHT)
+            order[kept++] = i;
+    particles_permute(particles, order, kept, settle->sim->threads);
+    for (uint32_t i = 0; i < kept; i++)
+        for (int k = 0; k < 3; k += 2) {
+            float *x = &particles->position[i][k];
+            *x = *x < 0.0f ? *x + period : *x >= period ? *x - period : *x;
+        }
+}
+
+/* Copies what is within a support of a face to beyond the opposite one: held there, with the velocity and
+ * pressure that the original has now. */
+static void copy_column(Settle *settle) {
+    Particles *particles = settle->particles;
+    const float period = (float)settle->period, support = settle->sim->kernel.support;
+    const uint32_t count = particles->count;
+    for (uint32_t i = 0; i < count; i++)
+        for (int turn_x = -1; turn_x <= 1; turn_x++)
+            for (int turn_z = -1; turn_z <= 1; turn_z++) {
+                const float *at = particles->position[i];
+                const float p[3] = {at[0] + (float)turn_x * period, at[1], at[2] + (float)turn_z * period};
+                if ((turn_x == 0 && turn_z == 0) || p[0] < -support || p[0] > period + support ||
+                    p[2] < -support || p[2] > period + support)
+                    continue;
+                const uint32_t to = particles_append(particles, p, particles->velocity[i], 0.0);
+                particles->pressure[to] = particles->pressure[i];
+                particles->pressure_divergence[to] = particles->pressure_divergence[i];
+                particles->edge[to] = EDGE_CAUGHT;
+            }
+}
+
+static bool search_column(Settle *settle, uint64_t first_id, Err *err) {
+    RestCloud *cloud = &settle->sim->rest;
+    wrap_column(settle, cloud->order.data);
+    copy_column(settle);
+    return search_all(settle, first_id, err);
 }
 
 /* What is held beside the new water: where it is too dense it presses more, and less where it is too thin, so
@@ -265,11 +339,11 @@ static void part_pairs(const Settle *settle) {
 static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, SkiffFill *fill, Err *err) {
     if (settle->steps == 0)
         return true;
+    const SkiffParams given = settle->params;
     SkiffParams *params = &settle->params;
-    *params = settle->sim->params;
     const double unit = (double)(params->particle_radius / params->time_step);
     const float scale = step_scale(settle);
-    const float errors = settle->frozen != NULL ? LAYER_ERRORS : 1.0f;
+    const float errors = settle->layer ? LAYER_ERRORS : 1.0f;
     params->max_density_error = errors * params->rest_density_error;
     params->max_divergence_error *= errors;
     params->softening = params->rest_softening;
@@ -305,6 +379,7 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
         move_active(settle, kept_share(params, step));
     }
     scale_pressures(settle->particles, 1.0f / (scale * scale));
+    settle->params = given;
     return true;
 }
 
@@ -382,11 +457,39 @@ static void restart_existing(SkiffSim *sim, uint64_t first_id) {
             memcpy(sim->particles.velocity[i], velocity[whence[i]], sizeof(Float4));
 }
 
-/* All of the simulation's particles with ids from `first_id` on; all others are held. */
-static bool settle_all(SkiffSim *sim, float surface, uint64_t first_id, SkiffFill *fill, Err *err) {
+static uint32_t count_edge(const Particles *particles) {
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < particles->count; i++)
+        count += particles->edge[i] != EDGE_NONE;
+    return count;
+}
+
+bool rest_settle_column(SkiffSim *sim, double period, SkiffFill *fill, Err *err) {
+    fill->active = sim->particles.count - count_edge(&sim->particles);
+    /* a period is at least two supports: at most eight copies of a particle */
+    if (!sim_reserve(sim, 9 * sim->particles.count, err) ||
+        !buffer_reserve(&sim->rest.held, "held particles", sim->particles.capacity + SLICE, err) ||
+        !buffer_reserve(&sim->rest.order, "points to keep", sim->particles.capacity * sizeof(uint32_t), err))
+        return false;
+    Settle settle = settle_all(sim, 0.0f, fill->active);
+    settle.held = sim->rest.held.data;
+    settle.period = period;
+    /* the copies lag one step behind: longer steps, or densities corrected at once, make them swing */
+    settle.params.rest_time_scale = 1.0f;
+    settle.params.rest_softening = COLUMN_SOFTENING;
+    settle.params.rest_retention = COLUMN_RETENTION;
+    settle.params.rest_max_speed = 0.0f;
+    settle.steps = COLUMN_STEPS;
+    const bool good = run_steps(&settle, search_column, 0, fill, err);
+    wrap_column(&settle, sim->rest.order.data);
+    return good;
+}
+
+/* All of the simulation's particles with ids from `first_id` on; all others, and the edge, are held. */
+static bool settle_water(SkiffSim *sim, float surface, uint64_t first_id, SkiffFill *fill, Err *err) {
     const SkiffParams *params = &sim->params;
     const bool layer_done = fill->steps > 0;
-    fill->active = fill->particles;
+    fill->active = fill->particles - count_edge(&sim->particles);
     if (fill->active == 0)
         return true;
     still_existing(sim);
@@ -395,22 +498,16 @@ static bool settle_all(SkiffSim *sim, float surface, uint64_t first_id, SkiffFil
         return false;
     const bool nothing_else = fill->active == sim->particles.count;
     memset(sim->rest.held.data, 0, sim->particles.capacity + SLICE);
-    Settle settle = {.sim = sim,
-                     .particles = &sim->particles,
-                     .grid = &sim->grid,
-                     .rows = &sim->rows,
-                     .boundary = &sim->boundary,
-                     .dfsph = &sim->dfsph,
-                     .held = nothing_else ? NULL : sim->rest.held.data,
-                     .active = fill->active,
-                     .steps = layer_done ? 0 : params->rest_steps,
-                     .surface = surface};
-    bool good = (nothing_else || stop_existing(sim, first_id, err)) &&
+    Settle settle = settle_all(sim, surface, fill->active);
+    settle.held = nothing_else ? NULL : sim->rest.held.data;
+    settle.tracks = sim->particles.count > fill->particles;
+    settle.steps = layer_done ? 0 : params->rest_steps;
+    bool good = (!settle.tracks || stop_existing(sim, first_id, err)) &&
                 run_steps(&settle, search_all, first_id, fill, err);
     settle.steps = params->rest_final_steps;
     settle.yields = params->rest_settle == REST_SETTLE_SHELL;
     good = good && run_steps(&settle, search_all, first_id, fill, err);
-    if (good && !nothing_else)
+    if (good && settle.tracks)
         restart_existing(sim, first_id);
     for (uint32_t i = 0; i < sim->particles.count; i++)
         if (sim->particles.id[i] >= first_id)
@@ -460,7 +557,7 @@ static void show(SkiffSim *sim, uint64_t first_id, bool all) {
     sim_add_pressures(sim);
 }
 
-static bool check_tile(SkiffSim *sim, Err *err) {
+bool rest_check_tile(SkiffSim *sim, Err *err) {
     if (sim->tile.count == 0 && !tile_load_default(&sim->tile, err))
         return false;
     const double own = (double)sim->params.volume_factor, needed = sim->tile.volume_factor;
@@ -477,7 +574,8 @@ bool rest_fill(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *
     const uint32_t count = sim->particles.count;
     const bool all = sim->params.rest_settle != REST_SETTLE_CANDIDATES;
     const double start = timer_ms();
-    if ((request->fitted == NULL && !check_tile(sim, err)) || (all && count > 0 && !keep_existing(sim, err)))
+    if ((request->fitted == NULL && !rest_check_tile(sim, err)) ||
+        (all && count > 0 && !keep_existing(sim, err)))
         return false;
     bool good = rest_gather(sim, request, fill, err);
     const double gathered = timer_ms();
@@ -488,8 +586,10 @@ bool rest_fill(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *
     good = good && (!layer || rest_settle(sim, request, fill, err));
     if (good)
         take_over(sim, 0, request->birth, fill);
+    if (good && request->mark_edge != NULL)
+        request->mark_edge(sim, count);
     const bool fits = request->fitted != NULL && fill->candidates == 0; /* as it is */
-    good = good && (!all || fits || settle_all(sim, request->surface, first_id, fill, err));
+    good = good && (!all || fits || settle_water(sim, request->surface, first_id, fill, err));
     if (good)
         show(sim, first_id, all && !fits);
     else

@@ -37,8 +37,7 @@ static bool rows_reserve(Rows *rows, const Particles *particles, int threads, Er
                           err) &&
            buffer_reserve(&rows->weights, "neighbour weights",
                           (size_t)rows->pool_entries * SLICE * sizeof(int16_t), err) &&
-           buffer_reserve(&rows->slice_start, "row starts", slices * sizeof(uint32_t), err) &&
-           buffer_reserve(&rows->slice_length, "row lengths", slices * sizeof(uint16_t), err) &&
+           buffer_reserve(&rows->slices, "row starts", slices * sizeof(SliceRows), err) &&
            buffer_reserve(&rows->density, "density", padded * sizeof(float), err) &&
            buffer_reserve(&rows->gradient_sum, "gradient sums", padded * sizeof(Float4), err) &&
            buffer_reserve(&rows->neighbour_counts, "neighbour counts", padded * sizeof(uint16_t), err) &&
@@ -84,8 +83,7 @@ bool rows_build(Rows *rows, const RowsJob *build, Err *err) {
                                .entries = rows->pool.data,
                                .frozen = build->frozen,
                                .weights = rows->weights.data,
-                               .slice_start = rows->slice_start.data,
-                               .slice_length = rows->slice_length.data,
+                               .slices = rows->slices.data,
                                .density = rows->density.data,
                                .gradient_sum = rows->gradient_sum.data,
                                .neighbours = rows->neighbours,
@@ -113,8 +111,7 @@ bool rows_build(Rows *rows, const RowsJob *build, Err *err) {
                 .wide = rows->wide,
                 .entries = job.entries,
                 .weights = job.weights,
-                .slice_start = job.slice_start,
-                .slice_length = job.slice_length,
+                .slices = job.slices,
                 .position = job.position,
                 .density = job.density,
                 .gradient_sum = (const Float4 *)job.gradient_sum};
@@ -126,8 +123,7 @@ bool rows_build(Rows *rows, const RowsJob *build, Err *err) {
 void rows_free(Rows *rows) {
     buffer_free(&rows->pool);
     buffer_free(&rows->weights);
-    buffer_free(&rows->slice_start);
-    buffer_free(&rows->slice_length);
+    buffer_free(&rows->slices);
     buffer_free(&rows->density);
     buffer_free(&rows->gradient_sum);
     buffer_free(&rows->neighbour_counts);

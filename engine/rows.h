@@ -18,7 +18,7 @@ typedef struct Rows {
     uint16_t *neighbours; /* [particles] fluid and boundary */
     bool wide;
     /* pool of row entries: threads take chunks, slices take from their thread's chunk */
-    Buffer pool, weights, slice_start, slice_length, density, gradient_sum, neighbour_counts;
+    Buffer pool, weights, slices, density, gradient_sum, neighbour_counts;
     uint32_t pool_entries;
     atomic_uint pool_used;
     RowShare shares[ROWS_MAX_THREADS];

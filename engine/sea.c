@@ -14,7 +14,7 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
-enum { FITTED_VERSION = 1, PATH_SIZE = 4096 };
+enum { FITTED_VERSION = 2, PATH_SIZE = 4096 };
 
 /* ---- Storage ---- */
 
@@ -184,6 +184,11 @@ static bool check_def(SkiffSim *sim, const SkiffDef *def, Err *err) {
             sim->sea.follow = b;
     if (sea->follow != NULL && sim->sea.follow < 0)
         good = err_add(err, ERR_INPUT, "Sea.follow: there is no body '%s'", sea->follow);
+    sim->sea.level = (double)sea->level;
+    const float beyond = sim->sea.follow >= 0 ? window_followed_distance(sim) : -1.0f;
+    if (beyond >= 0.0f)
+        good = err_add(err, ERR_INPUT, "Sea.follow: body '%s' starts outside the window, by %.3g m",
+                       sea->follow, (double)beyond);
     for (int k = 0; k < sea->path_count; k++) {
         const double *p = sea->path[k];
         if (!isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2]) || (k > 0 && p[0] <= sea->path[k - 1][0]))
@@ -201,8 +206,8 @@ static bool check_def(SkiffSim *sim, const SkiffDef *def, Err *err) {
 static bool take_def(SkiffSim *sim, const SkiffDef *def, Err *err) {
     Sea *sea = &sim->sea;
     sea->on = true;
-    sea->level = (double)def->sea.level;
     sea->absorbs = def->sea.absorb;
+    sea->water_edge = sea_has_water_edge(def);
     sea->has_region = def->sea.has_region;
     for (int k = 0; k < 3; k++) {
         sea->centre[k] = 0.5 * ((double)sim->tank.min[k] + (double)sim->tank.max[k]);
@@ -219,6 +224,32 @@ static bool take_def(SkiffSim *sim, const SkiffDef *def, Err *err) {
     return true;
 }
 
+bool sea_has_water_edge(const SkiffDef *def) {
+    return def->sea.on && def->params.window_edge == WINDOW_EDGE_WATER &&
+           (def->sea.follow != NULL || def->sea.path_count > 0);
+}
+
+/* The initial water of a window whose edge is water. */
+static bool fill_edged(SkiffSim *sim, Err *err) {
+    const float depth = (float)(sim->sea.level - sim->origin[1]) - sim->tank.min[1] + sim->kernel.support;
+    if (!water_make(&sim->sea.water, sim, depth, err) || !edge_gather_all(sim, err)) {
+        err_prefix(err, "Sea");
+        return false;
+    }
+    const uint32_t count = sim->sea.laid.water.count;
+    const SeaPlace place = {(float)(sim->sea.level - sim->origin[1])};
+    RestRequest request = sea_request(sim, &place);
+    request.place = anywhere;
+    request.fitted = &sim->sea.laid.water;
+    request.mark_edge = edge_mark;
+    for (int k = 0; k < 3; k++) {
+        request.bounds.min[k] = sim->tank.min[k] - sim->kernel.support;
+        request.bounds.max[k] = sim->tank.max[k] + sim->kernel.support;
+    }
+    return sim_reserve(sim, count + count / 10, err) && rest_fill(sim, &request, &sim->fill, err) &&
+           absorb_make(sim, err);
+}
+
 /* The initial water: the fitted one, less what bodies take up. */
 static bool fill_first(SkiffSim *sim, Err *err) {
     const SeaPlace place = {(float)(sim->sea.level - sim->origin[1])};
@@ -232,8 +263,12 @@ static bool fill_first(SkiffSim *sim, Err *err) {
 bool sea_make(SkiffSim *sim, const SkiffDef *def, Err *err) {
     if (!def->sea.on)
         return true;
-    if (!check_def(sim, def, err) || !take_def(sim, def, err) || !tile_load_default(&sim->tile, err))
+    if (!check_def(sim, def, err) || !take_def(sim, def, err) || !rest_check_tile(sim, err))
         return false;
+    if (def->sea.dry)
+        return true;
+    if (sim->sea.water_edge)
+        return fill_edged(sim, err);
     char path[PATH_SIZE] = "";
     if (def->sea.cache != NULL)
         snprintf(path, sizeof path, "%.4000s/sea-%016llx.skiff", def->sea.cache,
@@ -259,6 +294,10 @@ void sea_free(Sea *sea) {
     buffer_free(&sea->inlet_buffer);
     buffer_free(&sea->distance_buffer);
     buffer_free(&sea->flow_buffer);
+    buffer_free(&sea->rim_start);
+    buffer_free(&sea->rim_index);
+    water_free(&sea->water);
+    water_list_free(&sea->laid);
     *sea = (Sea){0};
 }
 

@@ -144,6 +144,8 @@ static bool make_tank(SkiffSim *sim, const SkiffDef *def, Err *err) {
         return false;
     const Mesh *mesh = &sim->tank.mesh;
     sim->tank_open = tank->open;
+    if (sea_has_water_edge(def))
+        return true;
     /* the lid of an open tank lies on the bounds: cutting just below leaves it out */
     SampleRegion region = {{-INFINITY, -INFINITY, -INFINITY}, {INFINITY, INFINITY, INFINITY}};
     const float spacing = def->params.boundary_spacing * def->params.particle_radius;
@@ -307,6 +309,17 @@ static bool choose_domain(SkiffSim *sim, const SkiffDef *def, Err *err) {
     return true;
 }
 
+/* A window sails away from bodies that stay, and their samples would span the whole way. */
+static void limit_bodies(SkiffSim *sim) {
+    BoundarySet *moving = &sim->boundary.moving;
+    moving->has_reach = true;
+    moving->reach = sim->domain;
+    for (int k = 0; k < 3; k++) {
+        moving->reach.min[k] -= sim->kernel.support;
+        moving->reach.max[k] += sim->kernel.support;
+    }
+}
+
 static uint64_t hash_def(const SkiffSim *sim, const SkiffDef *def) {
     XXH3_state_t state;
     XXH3_64bits_reset(&state);
@@ -320,6 +333,8 @@ static uint64_t hash_def(const SkiffSim *sim, const SkiffDef *def) {
         XXH3_64bits_update(&state, &sim->bodies[b].mass, sizeof(double));
         XXH3_64bits_update(&state, &sim->bodies[b].free_axes, sizeof(uint32_t));
         XXH3_64bits_update(&state, &sim->bodies[b].release_time, sizeof(double));
+        XXH3_64bits_update(&state, &sim->bodies[b].stop_time, sizeof(double));
+        XXH3_64bits_update(&state, &sim->bodies[b].ramp_time, sizeof(double));
     }
     for (int b = 0; b < def->block_count; b++) {
         XXH3_64bits_update(&state, def->blocks[b].start, 6 * sizeof(float));
@@ -332,6 +347,8 @@ static uint64_t hash_def(const SkiffSim *sim, const SkiffDef *def) {
         XXH3_64bits_update(&state, &sim->drives[d].body, sizeof(int));
         XXH3_64bits_update(&state, &sim->drives[d].def, sizeof(SkiffDriveDef));
     }
+    XXH3_64bits_update(&state, sim->tank.min, sizeof sim->tank.min);
+    XXH3_64bits_update(&state, sim->tank.max, sizeof sim->tank.max);
     XXH3_64bits_update(&state, &sim->domain, sizeof sim->domain);
     XXH3_64bits_update(&state, &sim->sea.level, sizeof sim->sea.level);
     XXH3_64bits_update(&state, &sim->sea.follow, sizeof sim->sea.follow);
@@ -378,7 +395,10 @@ static bool build(SkiffSim *sim, const SkiffDef *def, Err *err) {
         good = make_body(sim, def, sim->body_count, err) && good;
     good = good && drives_make(sim, def, err) && check_overlaps(sim, def, err) &&
            choose_domain(sim, def, err) && boundary_weigh(&sim->boundary.fixed, &sim->kernel, err) &&
-           sim_reserve(sim, (uint32_t)particles, err) &&
+           sim_reserve(sim, (uint32_t)particles, err);
+    if (good)
+        limit_bodies(sim);
+    good = good &&
            boundary_place(&sim->boundary, sim->bodies, sim->body_count, sim->origin, sim->kernel.support,
                           sim->threads, err) &&
            sea_make(sim, def, err) && block_emit(sim, &sim->stats.particles_in[SKIFF_IN_EMITTED], err) &&

@@ -51,6 +51,7 @@ struct SkiffSim {
     Particles particles;
 
     /* sort and search */
+    uint32_t edge_count; /* particles that stand still around a window */
     Grid grid;
     Rows rows;
     Boundary boundary;

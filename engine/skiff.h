@@ -151,6 +151,8 @@ typedef struct SkiffBodyDef {
     float angular_velocity[3]; /* rad/s, world axes */
     uint32_t free_axes;        /* 0: static or prescribed */
     double release_time; /* s; until then the body is held still in every axis that is free afterwards */
+    double stop_time;    /* s; from then on it is held still in every axis; INFINITY: never */
+    double ramp_time; /* s; velocities of axes that are not free rise from 0 between the times 0 and this */
     const SkiffDriveDef *drive; /* NULL: none */
 } SkiffBodyDef;
 
@@ -173,7 +175,9 @@ typedef struct SkiffProbeDef {
 } SkiffProbeDef;
 
 /* A sea without end around the tank [Carensac2023 sec. 4]: the tank is filled to `level` with water at rest,
- * becomes the window that follows a body, and waves die at its walls. */
+ * becomes the window that follows a body, and waves die at its edge. One that moves has no walls unless
+ * windowEdge says so: the world's water at rest stands around it, one support wide, as particles that are
+ * part of the simulation's. */
 typedef struct SkiffSeaDef {
     bool on;
     float level;        /* y of the still surface, m */
@@ -185,6 +189,7 @@ typedef struct SkiffSeaDef {
     bool has_region; /* absorption only where [min, max] is, m */
     float region_min[3], region_max[3];
     const char *cache; /* folder for water that was made before, or NULL */
+    bool dry;          /* no water, which takes long to make: for who only looks at shapes */
 } SkiffSeaDef;
 
 typedef enum SkiffSimd { SKIFF_SIMD_AUTO, SKIFF_SIMD_PLAIN, SKIFF_SIMD_AVX2, SKIFF_SIMD_AVX512 } SkiffSimd;
@@ -363,7 +368,7 @@ typedef struct SkiffStats {
     double time, dt; /* s, at the end of the step */
     uint32_t particles, boundary_samples, contacts;
     uint32_t particles_in[SKIFF_IN_COUNT], particles_out[SKIFF_OUT_COUNT]; /* during the step, by cause */
-    bool moved; /* the window moved in this step; never so far: there is no window yet */
+    bool moved; /* the window moved in this step */
     int density_iterations, divergence_iterations;
     double density_error_percent; /* mean over all particles of max(0, rho/rho0 - 1), found at the start of
                                      the step: what the last one left */
@@ -486,6 +491,9 @@ SkiffTile *skiff_tile_make(const SkiffTileDef *def, Err *err);
 /* The particles inside [min, max] (m, world) as a block. NULL with ERR_INPUT: none is, or the box is too
  * small for a particle with all its neighbours. */
 SkiffTile *skiff_tile_cut(const SkiffSim *sim, const double min[3], const double max[3], Err *err);
+/* The built-in tile settled under a free surface, as a block whose sides repeat: what a sea is made of. Takes
+ * a minute. */
+SkiffTile *skiff_tile_surface(int threads, Err *err);
 /* Reads a file; path NULL: the tile that comes with the program. NULL with ERR_INPUT or ERR_IO. */
 SkiffTile *skiff_tile_open(const char *path, Err *err);
 bool skiff_tile_save(const SkiffTile *tile, const char *path, Err *err);

@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { STATE_VERSION = 3, BODY_SCALARS = 3 + 4 + 3 + 3 };
+enum { STATE_VERSION = 4, BODY_SCALARS = 3 + 4 + 3 + 3 };
 
 static void body_to_scalars(const Body *body, double *out) {
     memcpy(out, body->position, 3 * sizeof(double));
@@ -46,7 +46,7 @@ bool skiff_save(const SkiffSim *sim, const char *path, Err *err) {
         emitted[b] = sim->blocks[b].done;
     const uint64_t header[4] = {sim->def_hash, sim->step, sim->particles.next_id, sim->sea.moves};
     const double place[4] = {sim->time, sim->origin[0], sim->origin[1], sim->origin[2]};
-    StateField fields[PARTICLE_FIELD_COUNT + 5];
+    StateField fields[PARTICLE_FIELD_COUNT + 5 + GHOST_FIELDS];
     uint32_t count = 0;
     add_field(fields, &count, "header", STATE_U64, 1, 4, header);
     add_field(fields, &count, "time_and_origin", STATE_F64, 1, 4, place);
@@ -56,6 +56,8 @@ bool skiff_save(const SkiffSim *sim, const char *path, Err *err) {
     add_field(fields, &count, "bodies", STATE_F64, BODY_SCALARS, (uint64_t)sim->body_count, bodies);
     add_field(fields, &count, "drives", STATE_F64, DRIVE_SCALARS, (uint64_t)sim->drive_count, drives);
     add_field(fields, &count, "blocks_emitted", STATE_I32, 1, (uint64_t)sim->block_count, emitted);
+    ghosts_describe(&sim->ghosts, fields + count);
+    count += GHOST_FIELDS;
     const bool good = state_file_write(path, STATE_VERSION, fields, count, err);
     free(bodies);
     free(drives);
@@ -94,7 +96,7 @@ static bool load_fields(SkiffSim *sim, const StateFile *file, const char *path, 
         if (!drive_check_scalars((const double *)drives->data + d * DRIVE_SCALARS, &reason))
             return err_set(err, ERR_INPUT, "%s: drives[%d]: %s", path, d, reason.message);
     }
-    if (!sim_reserve(sim, (uint32_t)position->count, err))
+    if (!sim_reserve(sim, (uint32_t)position->count, err) || !ghosts_load(&sim->ghosts, file, path, err))
         return false;
     Particles *particles = &sim->particles;
     particles->count = (uint32_t)position->count;
@@ -134,5 +136,6 @@ bool skiff_load(SkiffSim *sim, const char *path, Err *err) {
                               .particles = sim->particles.count,
                               .boundary_samples = sim->stats.boundary_samples};
     return boundary_place(&sim->boundary, sim->bodies, sim->body_count, sim->origin, sim->kernel.support,
-                          sim->threads, err);
+                          sim->threads, err) &&
+           (!sim->sea.water_edge || absorb_make(sim, err));
 }

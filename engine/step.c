@@ -29,7 +29,8 @@ static DfsphProblem step_problem(SkiffSim *sim) {
                           .bodies = sim->bodies,
                           .body_count = sim->body_count,
                           .particles = &sim->particles,
-                          .evaluated_count = sim->particles.count,
+                          .held = sim->edge_count > 0 ? sim->particles.edge : NULL,
+                          .evaluated_count = sim->particles.count - sim->edge_count,
                           .threads = sim->threads};
 }
 
@@ -44,6 +45,9 @@ static bool place_bodies(SkiffSim *sim, Err *err) {
 
 static bool sort_particles(SkiffSim *sim, Err *err) {
     const bool remove = sim->params.escape == 1;
+    sim->edge_count = 0;
+    for (uint32_t i = 0; sim->sea.water_edge && i < sim->particles.count; i++)
+        sim->edge_count += sim->particles.edge[i] != EDGE_NONE;
     return grid_sort(&sim->grid, &sim->particles, sim->kernel.support, &sim->domain,
                      remove ? &sim->stats.particles_out[SKIFF_OUT_ESCAPED] : NULL, sim->threads, err);
 }
@@ -54,6 +58,7 @@ static RowsJob rows_job(SkiffSim *sim) {
                      .particles = &sim->particles,
                      .kernel = &sim->kernel,
                      .volume = sim->volume,
+                     .frozen = sim->edge_count > 0 ? sim->particles.edge : NULL,
                      .threads = sim->threads};
 }
 
@@ -116,6 +121,10 @@ static AdvanceSums advance_block(SkiffSim *sim, uint32_t block) {
     AdvanceSums sums = {0};
     for (uint32_t i = begin; i < end; i++) {
         float *x = particles->position[i], *v = particles->velocity[i];
+        if (particles->edge[i] != EDGE_NONE) {
+            edge_advance(sim, i);
+            continue;
+        }
         for (int k = 0; k < 3; k++) {
             x[k] += dt * v[k];
             sums.momentum[k] += (double)v[k];
@@ -147,7 +156,8 @@ static void summarise(SkiffSim *sim, const AdvanceSums *blocks, uint32_t block_c
         all.max_speed_sq = one->max_speed_sq <= all.max_speed_sq ? all.max_speed_sq : one->max_speed_sq;
         all.max_density = one->max_density <= all.max_density ? all.max_density : one->max_density;
     }
-    const double n = sim->particles.count > 0 ? sim->particles.count : 1.0;
+    const uint32_t moving = sim->particles.count - sim->edge_count;
+    const double n = moving > 0 ? moving : 1.0;
     const double mass = (double)sim->volume * (double)sim->params.rest_density;
     SkiffStats *stats = &sim->stats;
     stats->particles = sim->particles.count;

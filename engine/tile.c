@@ -117,6 +117,10 @@ bool tile_load_default(RestTile *tile, Err *err) {
     return tile_parse("built-in rest tile", tile_bytes, tile_bytes_size, tile, err);
 }
 
+bool tile_load_surface(RestTile *tile, Err *err) {
+    return tile_parse("built-in rest surface", surface_bytes, surface_bytes_size, tile, err);
+}
+
 /* ---- Cutting ---- */
 
 /* World position of particle i relative to the cut's corner, r; false: outside. */

@@ -49,6 +49,8 @@ bool tile_measure(const RestTile *tile, int threads, SkiffTileQuality *quality, 
 
 /* The tile that is part of the program: assets/rest/tile.skiff. */
 bool tile_load_default(RestTile *tile, Err *err);
+/* What lies over it under a free surface (water.h): assets/rest/surface.skiff. */
+bool tile_load_surface(RestTile *tile, Err *err);
 /* ERR_INPUT: no such file, damaged, or its numbers make no sense. */
 bool tile_load(const char *path, RestTile *tile, Err *err);
 /* The same from memory; `name` is used in messages. */

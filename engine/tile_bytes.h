@@ -1,4 +1,4 @@
-/* The file assets/rest/tile.skiff, turned into an array when the engine is built (CMakeLists.txt). */
+/* The files assets/rest/tile.skiff and surface.skiff, turned into arrays when the engine is built (CMakeLists.txt). */
 #ifndef SKIFF_TILE_BYTES_H
 #define SKIFF_TILE_BYTES_H
 
@@ -6,5 +6,7 @@
 
 extern const unsigned char tile_bytes[];
 extern const size_t tile_bytes_size;
+extern const unsigned char surface_bytes[];
+extern const size_t surface_bytes_size;
 
 #endif

@@ -1,6 +1,5 @@
 /* The functions of skiff.h for water at rest: handles around the tiles of tile.h. */
 #include "sim.h"
-#include "tile.h"
 
 #include <stdlib.h>
 
@@ -36,6 +35,16 @@ SkiffTile *skiff_tile_cut(const SkiffSim *sim, const double min[3], const double
         cut.max[k] = max[k];
     }
     return tile_cut(&cut, &tile, err) ? own(&tile, err) : NULL;
+}
+
+SkiffTile *skiff_tile_surface(int threads, Err *err) {
+    SkiffDef def = skiff_def_default();
+    RestTile surface;
+    def.threads = threads;
+    SkiffSim *sim = skiff_create(&def, err);
+    const bool good = sim && tile_load_default(&sim->tile, err) && water_make_surface(sim, &surface, err);
+    skiff_destroy(sim);
+    return good ? own(&surface, err) : NULL;
 }
 
 SkiffTile *skiff_tile_open(const char *path, Err *err) {

@@ -139,8 +139,8 @@ uint64_t skiff_memory(const SkiffSim *sim) {
     total += grid->start_buffer.size + grid->cell_buffer.size + grid->order_buffer.size +
              grid->unsorted_buffer.size + grid->histogram_buffer.size;
     const Rows *rows = &sim->rows;
-    total += rows->pool.size + rows->weights.size + rows->slice_start.size + rows->slice_length.size +
-             rows->density.size + rows->gradient_sum.size + rows->neighbour_counts.size + rows->scratch.size;
+    total += rows->pool.size + rows->weights.size + rows->slices.size + rows->density.size +
+             rows->gradient_sum.size + rows->neighbour_counts.size + rows->scratch.size;
     for (int m = 0; m < 2; m++) {
         const BoundarySet *set = m ? &sim->boundary.moving : &sim->boundary.fixed;
         total += set->buffer.size + set->cells.size + set->occupied.size + set->samples.capacity * 36u;

@@ -150,10 +150,39 @@ static bool fill_ring(SkiffSim *sim, const WindowPlace *place, Err *err) {
     return good;
 }
 
+float window_followed_distance(const SkiffSim *sim) {
+    const Body *body = &sim->bodies[sim->sea.follow];
+    const float level = (float)(sim->sea.level - sim->origin[1]);
+    const float p[3] = {(float)(body->position[0] - sim->origin[0]), level,
+                        (float)(body->position[2] - sim->origin[2])};
+    return shape_distance_sides(&sim->tank, p, NULL);
+}
+
+/* What is followed must not get away: beyond the edge there is no water to carry it. */
+static bool check_followed(const SkiffSim *sim, Err *err) {
+    const Sea *sea = &sim->sea;
+    if (!sea->on || sea->follow < 0)
+        return true;
+    const float beyond = window_followed_distance(sim);
+    return beyond < 0.0f ||
+           err_set(
+               err, ERR_DIVERGED,
+               "body '%s' has left the window by %.3g m: it moves faster than Configuration.windowCap lets "
+               "the window follow, %g h a step",
+               sim->bodies[sea->follow].name, (double)beyond, (double)sim->params.window_cap);
+}
+
 bool window_follow(SkiffSim *sim, Err *err) {
     WindowPlace place = {.sim = sim, .walls = &sim->tank};
+    if (!check_followed(sim, err))
+        return false;
     if (!next_shift(sim, place.shift))
         return true;
+    if (sim->sea.water_edge) {
+        sim->sea.moves++;
+        sim->stats.moved = true;
+        return edge_move(sim, place.shift, err);
+    }
     const float support = sim->kernel.support;
     place.old_margin = sim->params.window_old * sim->params.particle_radius;
     place.new_margin = sim->params.window_new * support;

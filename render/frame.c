@@ -22,15 +22,16 @@ static const PassType *const passes_in_order[] = {
     &backdrop_pass,   /* particles: what is behind all */
     &mesh_pass,       /* boats, walls, ground */
     &reflection_pass, /* water: the same, mirrored */
-    &sphere_pass,     /* particles: spheres, then those that fade */
-    &depth_pass,      /* water: depth of the particles                1/2 size */
-    &filter_pass,     /* water: smoothed                              1/2 size */
+    &depth_pass,      /* water: depth of the particles                CPU, 1/2 size */
+    &filter_pass,     /* water: smoothed                              CPU, 1/2 size */
     &normal_pass,     /* water: normals of it                         1/2 size */
     &thickness_pass,  /* water: how much of it, and foam              1/4 size */
     &composite_pass,  /* water: surface, ocean, reflection, refraction, foam */
     &spray_pass,      /* water: droplets */
-    &fxaa_pass,       /* smooth edges */
-    &read_pass,       /* back to memory, averaged                     CPU */
+    &read_pass,       /* back to memory */
+    &sphere_pass,     /* particles: spheres, then those that fade     CPU */
+    &fxaa_pass,       /* smooth edges                                 CPU */
+    &average_pass,    /* as large as is wanted                        CPU */
     &legend_pass,     /* particles: what the colours mean             CPU */
 };
 enum { COUNT = sizeof passes_in_order / sizeof passes_in_order[0] };
@@ -189,16 +190,12 @@ static void fill_block(Frame *frame) {
 static bool create_tables(Frame *frame, Err *err) {
     static const float nothing[4] = {0.0f};
     uint8_t(*ripples)[4] = malloc((size_t)RIPPLE_MAP_EDGE * RIPPLE_MAP_EDGE * sizeof *ripples);
-    uint8_t colors[COLOR_MAP_SIZE][4] = {{0}};
     if (!ripples)
         return err_set(err, ERR_GL, "no memory for the renderer's tables");
     tables_ripples(ripples);
-    for (int i = 0; i < COLOR_MAP_SIZE; i++)
-        tables_color((float)i / (COLOR_MAP_SIZE - 1), colors[i]);
     const Gl *gl = frame->gl;
     frame->ripples =
         texture_create(gl, TEXTURE_RGBA8, RIPPLE_MAP_EDGE, RIPPLE_MAP_EDGE, TEXTURE_REPEAT_MIPMAP, ripples);
-    frame->color_map = texture_create(gl, TEXTURE_RGBA8, COLOR_MAP_SIZE, 1, TEXTURE_LINEAR, colors);
     frame->edge_distance = texture_create(gl, TEXTURE_R32F, 2, 2, TEXTURE_LINEAR, nothing);
     frame->ocean_foam = texture_create(gl, TEXTURE_R32F, 2, 2, TEXTURE_LINEAR, nothing);
     free(ripples);
@@ -211,8 +208,9 @@ static bool is_used(const Frame *frame, int index) {
 
 bool frame_create(Frame *frame, Pass *passes, Err *err) {
     const Gl *gl = frame->gl;
-    frame->pixels = malloc((size_t)frame->width * (size_t)frame->height * 4);
-    if (!frame->pixels)
+    size_t pixels = (size_t)frame->width * (size_t)frame->height;
+    if (frame->def.look == GFX_LOOK_PARTICLES &&
+        !(frame->mesh_depth = calloc(pixels, sizeof *frame->mesh_depth)))
         return err_set(err, ERR_GL, "no memory for an image of %d x %d", frame->width, frame->height);
     gl->GenVertexArrays(1, &frame->empty_vertex_array);
     gl->GenBuffers(1, &frame->block_buffer);
@@ -245,15 +243,17 @@ void frame_destroy(Frame *frame, Pass *passes) {
     texture_destroy(gl, &frame->ripples);
     texture_destroy(gl, &frame->edge_distance);
     texture_destroy(gl, &frame->ocean_foam);
-    texture_destroy(gl, &frame->color_map);
-    destroy_points(gl, &frame->body);
+    destroy_points(gl, &frame->tiles);
+    destroy_points(gl, &frame->rich);
     destroy_points(gl, &frame->droplets);
-    destroy_points(gl, &frame->fading);
     mesh_store_free(&frame->meshes, gl);
     gl->DeleteVertexArrays(1, &frame->empty_vertex_array);
     gl->DeleteBuffers(1, &frame->block_buffer);
     surface_free(&frame->surface);
-    free(frame->pixels);
+    buffer_free(&frame->body_discs.memory);
+    buffer_free(&frame->fading_discs.memory);
+    buffer_free(&frame->band_memory);
+    free(frame->mesh_depth);
 }
 
 static double now_ms(void) {

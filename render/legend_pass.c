@@ -52,13 +52,15 @@ static bool draw(Pass *pass, Frame *frame, Err *err) {
     if (!font)
         return false;
     int line = (int)(1.5f * size), pad = (int)(0.9f * size);
-    Box box = {pad, image.height - pad - 3 * line - pad, 17 * line / 2, 3 * line + pad};
-    if (box.width > image.width - 2 * pad)
-        box.width = image.width - 2 * pad;
-    Box bar = {box.left + pad, box.top + pad / 2 + line, box.width - 2 * pad, line / 2};
     char title[128];
     bool unit = field->unit && field->unit[0];
     snprintf(title, sizeof title, unit ? "%s  [%s]" : "%s", field->title, unit ? field->unit : "");
+    Box box = {pad, image.height - pad - 3 * line - pad, 17 * line / 2, 3 * line + pad};
+    int needed = (int)text_width(font, title) + 2 * pad + 1;
+    box.width = needed > box.width ? needed : box.width;
+    if (box.width > image.width - 2 * pad)
+        box.width = image.width - 2 * pad;
+    Box bar = {box.left + pad, box.top + pad / 2 + line, box.width - 2 * pad, line / 2};
     fill(image, box, (GfxInk){12, 16, 22, 0.62f});
     text_draw(font, image, (float)bar.left, (float)(box.top + line), (GfxInk){240, 243, 247, 1.0f}, title);
     if (bar.width > 1) {

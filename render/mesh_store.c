@@ -168,6 +168,18 @@ static void upload_lines(StoredMesh *mesh, const Gl *gl, const MeshWork *work, s
     gl->VertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, 0, NULL);
 }
 
+static void find_bounds(const GfxMeshDef *def, float bounds[2][3]) {
+    for (int k = 0; k < 3; k++) {
+        bounds[0][k] = INFINITY;
+        bounds[1][k] = -INFINITY;
+    }
+    for (uint32_t i = 0; i < def->vertex_count; i++)
+        for (int k = 0; k < 3; k++) {
+            bounds[0][k] = fminf(bounds[0][k], def->vertices[i][k]);
+            bounds[1][k] = fmaxf(bounds[1][k], def->vertices[i][k]);
+        }
+}
+
 static bool reserve_work(MeshWork *work, const GfxMeshDef *def, Err *err) {
     size_t triangles = def->triangle_count;
     work->area_normals = malloc(triangles * sizeof *work->area_normals);
@@ -204,6 +216,7 @@ int mesh_store_add(MeshStore *store, const Gl *gl, const GfxMeshDef *def, Err *e
     if (ok) {
         StoredMesh *mesh = &store->meshes[store->count];
         *mesh = (StoredMesh){.material = def->material, .own_colors = def->triangle_colors != NULL};
+        find_bounds(def, mesh->bounds);
         find_normals(def, &work);
         find_triangles_around(def, &work);
         fill_corners(def, &work);

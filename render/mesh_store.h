@@ -8,6 +8,7 @@
 typedef struct StoredMesh {
     GfxMaterial material;
     bool own_colors;
+    float bounds[2][3];                    /* least and greatest coordinates, own frame */
     GLuint vertex_array, buffer;           /* triangles */
     GLuint edge_vertex_array, edge_buffer; /* lines: edges between faces at an angle */
     GLsizei vertex_count, edge_vertex_count;

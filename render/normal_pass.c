@@ -13,7 +13,7 @@ static bool create(Pass *pass, Frame *frame, Err *err) {
 static bool draw(Pass *pass, Frame *frame, Err *err) {
     (void)err;
     framebuffer_bind(frame->gl, pass->framebuffers[0], &frame->images[IMAGE_NORMAL]);
-    texture_bind(frame->gl, 0, &frame->images[IMAGE_DEPTH_WORK]);
+    texture_bind(frame->gl, 0, &frame->images[IMAGE_SMOOTH]);
     frame->gl->UseProgram(pass->programs[0]);
     pass_fill(frame);
     return true;

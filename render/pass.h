@@ -4,10 +4,12 @@
 
 #include "gfx.h"
 #include "mesh_store.h"
+#include "splat.h"
 #include "surface.h"
 #include "target.h"
 
 enum { RIPPLE_LAYERS = 4 };
+#define NO_DEPTH 1e4f /* as in shaders/frame.glsl */
 
 /* The uniform block `Frame` of shaders/frame.glsl, layout std140. */
 typedef struct FrameBlock {
@@ -37,12 +39,13 @@ typedef enum ImageId {
     IMAGE_MESH_DEPTH,
     IMAGE_REFLECTION, /* meshes mirrored in still water */
     IMAGE_REFLECTION_DEPTH,
-    IMAGE_DEPTH, /* of the fluid: eye depth minus that of still water, m; NO_DEPTH where there is none */
-    IMAGE_DEPTH_WORK,
+    IMAGE_DEPTH,     /* of the fluid: eye depth minus that of still water, m; NO_DEPTH where there is none */
+    IMAGE_SMOOTH,    /* the same, smoothed */
     IMAGE_NORMAL,    /* of the fluid in the eye's frame x, y; residual depth; coverage */
     IMAGE_THICKNESS, /* m of water along the ray in particles near the surface; foam */
     IMAGE_COMPOSED,
-    IMAGE_FINISHED,
+    IMAGE_READ,     /* the picture as it was drawn */
+    IMAGE_FINISHED, /* with smooth edges */
     IMAGE_COUNT
 } ImageId;
 
@@ -58,20 +61,24 @@ typedef struct Frame {
     int width, height; /* drawn: with supersampling */
     GLuint empty_vertex_array, block_buffer;
     Texture images[IMAGE_COUNT];
-    Texture ripples, edge_distance, ocean_foam, color_map; /* tables */
-    float painted_sun[3];                                  /* for which IMAGE_SKY is right */
+    void *memory[IMAGE_COUNT];                  /* of those that the CPU draws: bottom row first */
+    Texture ripples, edge_distance, ocean_foam; /* tables */
+    float painted_sun[3];                       /* for which IMAGE_SKY is right */
     MeshStore meshes;
 
     /* Of this image. */
     const GfxScene *scene;
     FrameBlock block;
     Surface surface;
-    PointBuffer body, droplets, fading; /* filled by surface_pass */
-    uint8_t *pixels;                    /* RGBA, bottom row first, width * height; filled by read_pass */
-    uint8_t *rgb;                       /* the caller's */
+    PointBuffer tiles;              /* of composite_pass */
+    PointBuffer rich, droplets;     /* filled by surface_pass */
+    Splat body_discs, fading_discs; /* filled by the passes that draw them */
+    float *mesh_depth;              /* of the look particles: the depth buffer, filled by read_pass */
+    Buffer band_memory;             /* of passes, during each */
+    uint8_t *rgb;                   /* the caller's */
 } Frame;
 
-enum { PASS_PROGRAMS = 2 };
+enum { PASS_PROGRAMS = 4 };
 
 /* GL objects of one pass; what is 0 is not used. */
 typedef struct Pass {
@@ -89,15 +96,19 @@ typedef struct PassType {
     bool (*draw)(Pass *pass, Frame *frame, Err *err);
 } PassType;
 
-extern const PassType surface_pass, sky_pass, backdrop_pass, mesh_pass, reflection_pass, sphere_pass,
-    depth_pass, filter_pass, normal_pass, thickness_pass, composite_pass, spray_pass, fxaa_pass, read_pass,
-    legend_pass;
+extern const PassType surface_pass, sky_pass, backdrop_pass, mesh_pass, reflection_pass, depth_pass,
+    filter_pass, normal_pass, thickness_pass, composite_pass, spray_pass, read_pass, sphere_pass, fxaa_pass,
+    average_pass, legend_pass;
 
 /* Creates the images of a look, and destroys all. */
 bool images_create(Frame *frame, Err *err);
 void images_destroy(Frame *frame);
 /* Reads an image back as pictures for the eye: rgb, width x height of the def, top row first. */
 bool images_show(Frame *frame, ImageId id, uint8_t *rgb, Err *err);
+
+/* Depth at which the ray through pixel (x, y) of an image meets still water: plane_depth of
+ * shaders/frame.glsl. */
+float pass_still_depth(const FrameBlock *block, int x, int y, int width, int height);
 
 /* Draws one triangle over the whole target, with depth test, depth writes and blending off. */
 void pass_fill(const Frame *frame);

@@ -20,7 +20,7 @@ static bool draw(Pass *pass, Frame *frame, Err *err) {
     gl->DepthMask(GL_FALSE);
     gl->Enable(GL_BLEND);
     gl->BlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
-    texture_bind(gl, 0, &frame->images[IMAGE_DEPTH_WORK]);
+    texture_bind(gl, 0, &frame->images[IMAGE_SMOOTH]);
     gl->UseProgram(pass->programs[0]);
     gl->BindVertexArray(frame->droplets.vertex_array);
     gl->DrawArrays(GL_POINTS, 0, frame->droplets.count);

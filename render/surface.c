@@ -274,6 +274,23 @@ static float bulk_of(const Cells *cells, int cell) {
     return part < 0.0f ? 0.0f : part > 1.0f ? 1.0f : part;
 }
 
+/* Do particles count there? (Distances are interpolated from the nearest sample: the margin is wide.) */
+static bool is_in_window(const GfxOcean *ocean, float spacing, const float p[3]) {
+    int at[2];
+    for (int k = 0; k < 2; k++) {
+        float part = (p[2 * k] - ocean->edge_min[k]) / (ocean->edge_max[k] - ocean->edge_min[k]);
+        float place = part * (float)(ocean->edge_size[k] - 1) + 0.5f;
+        if (!(place >= 0.0f && place < (float)ocean->edge_size[k]))
+            return false;
+        at[k] = (int)place;
+    }
+    float half_cell = 0.0f;
+    for (int k = 0; k < 2; k++)
+        half_cell += 0.5f * (ocean->edge_max[k] - ocean->edge_min[k]) / (float)(ocean->edge_size[k] - 1);
+    return ocean->edge_distance[(size_t)at[1] * ocean->edge_size[0] + (size_t)at[0]] >
+           ocean->blend[0] - half_cell - 3.0f * spacing;
+}
+
 static SurfacePoint make_point(const GfxParticles *particles, const float *values, uint32_t i, float bulk) {
     const float *p = particles->position[i];
     return (SurfacePoint){{p[0], p[1], p[2]}, fade_of(particles, i), values ? values[i] : 0.0f, bulk};
@@ -309,6 +326,8 @@ bool surface_select(Surface *surface, const GfxScene *scene, GfxLook look, Err *
             cells.cell_of[i] = -1;
             continue;
         }
+        if (ocean && !is_in_window(&scene->ocean, particles->spacing, particles->position[i]))
+            continue;
         SurfacePoint point = make_point(particles, values, i, water ? bulk_of(&cells, cell) : 0.0f);
         if (!water && fade < 1.0f)
             surface->fading.points[surface->fading.count++] = point;

@@ -1,4 +1,4 @@
-/* Chooses the particles to draw (surface.c) and hands them to GL. */
+/* Chooses the particles to draw (surface.c) and hands GL those that it draws. */
 #include "pass.h"
 
 #include <stddef.h>
@@ -20,17 +20,15 @@ static void create_points(const Gl *gl, PointBuffer *points) {
 static bool create(Pass *pass, Frame *frame, Err *err) {
     (void)pass;
     (void)err;
-    create_points(frame->gl, &frame->body);
+    create_points(frame->gl, &frame->rich);
     create_points(frame->gl, &frame->droplets);
-    create_points(frame->gl, &frame->fading);
     return true;
 }
 
-static void upload(const Gl *gl, PointBuffer *points, const SurfaceList *list) {
-    points->count = (GLsizei)list->count;
-    gl->BindBuffer(GL_ARRAY_BUFFER, points->buffer);
-    gl->BufferData(GL_ARRAY_BUFFER, (GLsizeiptr)((size_t)list->count * sizeof(SurfacePoint)), list->points,
-                   GL_STREAM_DRAW);
+static void upload(const Gl *gl, PointBuffer *buffer, const SurfacePoint *points, uint32_t count) {
+    buffer->count = (GLsizei)count;
+    gl->BindBuffer(GL_ARRAY_BUFFER, buffer->buffer);
+    gl->BufferData(GL_ARRAY_BUFFER, (GLsizeiptr)((size_t)count * sizeof *points), points, GL_STREAM_DRAW);
 }
 
 static bool draw(Pass *pass, Frame *frame, Err *err) {
@@ -38,9 +36,8 @@ static bool draw(Pass *pass, Frame *frame, Err *err) {
     Surface *surface = &frame->surface;
     if (!surface_select(surface, frame->scene, frame->def.look, err))
         return false;
-    upload(frame->gl, &frame->body, &surface->body);
-    upload(frame->gl, &frame->droplets, &surface->droplets);
-    upload(frame->gl, &frame->fading, &surface->fading);
+    upload(frame->gl, &frame->rich, surface->body.points, surface->rich_count);
+    upload(frame->gl, &frame->droplets, surface->droplets.points, surface->droplets.count);
     return true;
 }
 

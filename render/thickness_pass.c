@@ -25,8 +25,8 @@ static bool draw(Pass *pass, Frame *frame, Err *err) {
     gl->Disable(GL_DEPTH_TEST);
     gl->Enable(GL_BLEND);
     gl->BlendFunc(GL_ONE, GL_ONE);
-    gl->BindVertexArray(frame->body.vertex_array);
-    gl->DrawArrays(GL_POINTS, 0, (GLsizei)frame->surface.rich_count);
+    gl->BindVertexArray(frame->rich.vertex_array);
+    gl->DrawArrays(GL_POINTS, 0, frame->rich.count);
     return true;
 }
 

@@ -78,6 +78,12 @@ vec4 tiles(vec3 n) {
     return vec4(mix(paint.rgb * tone, vec3(0.36, 0.48, 0.55), 0.55 * line), 0.15);
 }
 
+// Waves leave sides wet above the sea: darker, and shining. 1: wet.
+float wetness() {
+    float line = place.y - eye.w + 0.025 * sin(9.0 * own.x) + 0.015 * sin(23.0 * own.x + 17.0 * own.z);
+    return edge.z > 0.0 && material != TANK && own_normal.y < 0.7 ? 1.0 - smoothstep(0.04, 0.16, line) : 0.0;
+}
+
 void main() {
     if (mirror < 0.0 && place.y < eye.w - 0.03)
         discard;
@@ -91,6 +97,8 @@ void main() {
         surface = stone();
     else if (material == TANK)
         surface = tiles(n);
+    float wet = wetness();
+    surface = vec4(surface.rgb * (1.0 - 0.30 * wet), surface.w + 0.45 * wet);
     vec3 to_eye = normalize(eye.xyz - place);
     // Light falls into a container through all its walls.
     float lit = material == TANK ? 0.45 + 0.35 * dot(n, sun.xyz) : max(dot(n, sun.xyz), 0.0);

@@ -35,7 +35,7 @@ void main() {
     float left = fetch(pixel - ivec2(1, 0)), right = fetch(pixel + ivec2(1, 0));
     float down = fetch(pixel - ivec2(0, 1)), up = fetch(pixel + ivec2(0, 1));
     float grazing = max(1.0, still_depth(uv) / max(abs(eye.y - eye.w), 0.3));
-    float limit = 2.5 * sphere.w * min(grazing, 8.0);
+    float limit = 0.8 * sphere.w * min(grazing, 8.0);
     vec3 centre = place(uv, z);
     vec3 along_x = slope(centre, place(uv - dx, left), place(uv + dx, right), z, left, right, limit);
     vec3 along_y = slope(centre, place(uv - dy, down), place(uv + dy, up), z, down, up, limit);

@@ -1,5 +1,6 @@
 // Paints the sky: a clear gradient, haze at the horizon, the sun's glow, thin fair-weather clouds.
 #include "frame.glsl"
+#include "sky.glsl"
 in vec2 uv;
 layout(location = 0) out vec4 color;
 
@@ -33,8 +34,7 @@ void main() {
     vec3 d = normalize(vec3(p.x, 1.0 - abs(p.x) - abs(p.y), p.y));
     float h = max(d.y, 0.0), towards_sun = max(dot(d, sun.xyz), 0.0);
     vec3 clear = mix(vec3(0.56, 0.73, 0.90), vec3(0.17, 0.40, 0.74), 1.0 - exp(-2.6 * h));
-    vec3 air = mix(vec3(0.80, 0.88, 0.94), vec3(0.93, 0.90, 0.84), pow(towards_sun, 3.0) * 0.7);
-    vec3 c = mix(clear, air, exp(-7.5 * h));
+    vec3 c = mix(clear, horizon_air(towards_sun), exp(-7.5 * h));
 
     // A layer of small cumulus far away and cirrus above, both thinner towards the zenith.
     vec2 ceiling = d.xz / (h + 0.16);
@@ -45,9 +45,6 @@ void main() {
     float far = smoothstep(0.02, 0.16, h);
     c = mix(c, vec3(0.95, 0.97, 0.99), 0.30 * veil * far);
     c = mix(c, cloud, 0.80 * puffs * far * (1.0 - 0.45 * h));
-    float glow = towards_sun * towards_sun;
-    glow *= glow;
-    float core = pow(glow, 8.0);
-    c += vec3(1.0, 0.86, 0.62) * (0.10 * glow + 0.22 * core + 0.9 * pow(towards_sun, 700.0));
+    c += sun_glow(towards_sun) + vec3(1.0, 0.86, 0.62) * 0.9 * pow(towards_sun, 700.0);
     color = vec4(c, 1.0);
 }

@@ -107,11 +107,30 @@ static inline Vf vf_from_int(Vi a) {
 static inline void vf_store_i16(int16_t *p, Vf a) {
     vi_store_i16(p, _mm512_cvtps_epi32(a));
 }
-static inline Vf vf_gather(const float *base, Vi index) {
-    return _mm512_i32gather_ps(index, base, 4);
-}
-static inline Vi vi_gather(const int32_t *base, Vi index) {
-    return _mm512_i32gather_epi32(index, base, 4);
+/* out[k][l] = rows[l * stride + k]: sixteen rows of sixteen become columns. */
+static inline void vi_transpose16(const int32_t *rows, int stride, int32_t out[LANES][LANES]) {
+    __m512i quad[4][4]; /* [rows 4 i to 4 i + 3][c]: columns c, 4 + c, 8 + c, 12 + c of these */
+    for (int i = 0; i < 4; i++) {
+        const int32_t *row = rows + 4 * i * stride;
+        const __m512i a = _mm512_loadu_si512(row), b = _mm512_loadu_si512(row + stride);
+        const __m512i c = _mm512_loadu_si512(row + 2 * stride), d = _mm512_loadu_si512(row + 3 * stride);
+        const __m512i ab_low = _mm512_unpacklo_epi32(a, b), ab_high = _mm512_unpackhi_epi32(a, b);
+        const __m512i cd_low = _mm512_unpacklo_epi32(c, d), cd_high = _mm512_unpackhi_epi32(c, d);
+        quad[i][0] = _mm512_unpacklo_epi64(ab_low, cd_low);
+        quad[i][1] = _mm512_unpackhi_epi64(ab_low, cd_low);
+        quad[i][2] = _mm512_unpacklo_epi64(ab_high, cd_high);
+        quad[i][3] = _mm512_unpackhi_epi64(ab_high, cd_high);
+    }
+    for (int c = 0; c < 4; c++) {
+        const __m512i a = _mm512_shuffle_i32x4(quad[0][c], quad[1][c], 0x44);
+        const __m512i b = _mm512_shuffle_i32x4(quad[0][c], quad[1][c], 0xEE);
+        const __m512i e = _mm512_shuffle_i32x4(quad[2][c], quad[3][c], 0x44);
+        const __m512i f = _mm512_shuffle_i32x4(quad[2][c], quad[3][c], 0xEE);
+        _mm512_storeu_si512(out[c], _mm512_shuffle_i32x4(a, e, 0x88));
+        _mm512_storeu_si512(out[4 + c], _mm512_shuffle_i32x4(a, e, 0xDD));
+        _mm512_storeu_si512(out[8 + c], _mm512_shuffle_i32x4(b, f, 0x88));
+        _mm512_storeu_si512(out[12 + c], _mm512_shuffle_i32x4(b, f, 0xDD));
+    }
 }
 static inline void vf_transpose4(__m512 r[4], Vf *x, Vf *y, Vf *z, Vf *w) {
     __m512 t0 = _mm512_unpacklo_ps(r[0], r[1]), t1 = _mm512_unpackhi_ps(r[0], r[1]);
@@ -290,12 +309,6 @@ static inline Vf vf_from_int(Vi v) {
 }
 static inline void vf_store_i16(int16_t *p, Vf v) {
     vi_store_i16(p, (Vi){_mm256_cvtps_epi32(v.a), _mm256_cvtps_epi32(v.b)});
-}
-static inline Vf vf_gather(const float *base, Vi index) {
-    return VF(_mm256_i32gather_ps(base, index.a, 4), _mm256_i32gather_ps(base, index.b, 4));
-}
-static inline Vi vi_gather(const int32_t *base, Vi index) {
-    return (Vi){_mm256_i32gather_epi32(base, index.a, 4), _mm256_i32gather_epi32(base, index.b, 4)};
 }
 /* r[k] holds points k (low half) and 4 + k (high half) */
 static inline void avx2_transpose4(const __m256 r[4], __m256 out[4]) {
@@ -483,16 +496,6 @@ static inline void simd_stream_end(void) {}
 static inline void vf_store_i16(int16_t *p, Vf a) {
     EACH_LANE p[l] = (int16_t)lrintf(a.v[l]);
 }
-static inline Vf vf_gather(const float *base, Vi index) {
-    Vf r;
-    EACH_LANE r.v[l] = base[index.v[l]];
-    return r;
-}
-static inline Vi vi_gather(const int32_t *base, Vi index) {
-    Vi r;
-    EACH_LANE r.v[l] = base[index.v[l]];
-    return r;
-}
 static inline void vf_gather4_i32(const Float4 *base, const int32_t *halves, Vf *x, Vf *y, Vf *z, Vf *w) {
     EACH_LANE {
         const float *p = float4_at(base, halves[l]);
@@ -553,6 +556,14 @@ static inline int vi_compress(int32_t *out, const int32_t *ids, Vm m) {
 #endif
 
 /* ---- On top of the above, the same text on every path ---- */
+
+#ifndef SIMD_AVX512
+static inline void vi_transpose16(const int32_t *rows, int stride, int32_t out[LANES][LANES]) {
+    for (int k = 0; k < LANES; k++)
+        for (int l = 0; l < LANES; l++)
+            out[k][l] = rows[l * stride + k];
+}
+#endif
 
 static inline Vf vf_zero(void) {
     return vf_set(0.0f);

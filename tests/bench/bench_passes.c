@@ -11,7 +11,7 @@
 
 enum { REPEATS = 9, MAX_THREADS = 2 };
 
-typedef struct Water {
+typedef struct Tank {
     Particles particles;
     Grid grid;
     Rows rows;
@@ -20,12 +20,12 @@ typedef struct Water {
     const Passes *passes;
     Float4 *operand, *vector, *gradient[3];
     float *result;
-} Water;
+} Tank;
 
-static bool water_make(Water *water, int edge, int layers, Err *err) {
+static bool tank_make(Tank *tank, int edge, int layers, Err *err) {
     const uint32_t count = (uint32_t)(edge * edge * layers);
     const float spacing = 0.0464f;
-    if (!particles_reserve(&water->particles, count, err))
+    if (!particles_reserve(&tank->particles, count, err))
         return false;
     uint32_t seed = 1;
     for (uint32_t i = 0; i < count; i++) {
@@ -36,25 +36,25 @@ static bool water_make(Water *water, int edge, int layers, Err *err) {
             x[k] = spacing * ((float)at[k] + 0.4f * (float)(seed >> 8) / 16777216.0f);
             v[k] = (float)(seed >> 16) / 65536.0f - 0.5f;
         }
-        particles_append(&water->particles, x, v, 0.0);
+        particles_append(&tank->particles, x, v, 0.0);
     }
     const size_t padded = count + BLOCK;
-    water->operand = aligned_alloc(64, padded * sizeof(Float4));
-    water->vector = aligned_alloc(64, padded * sizeof(Float4));
-    water->result = aligned_alloc(64, padded * sizeof(float));
+    tank->operand = aligned_alloc(64, padded * sizeof(Float4));
+    tank->vector = aligned_alloc(64, padded * sizeof(Float4));
+    tank->result = aligned_alloc(64, padded * sizeof(float));
     for (int k = 0; k < 3; k++)
-        water->gradient[k] = aligned_alloc(64, padded * sizeof(Float4));
+        tank->gradient[k] = aligned_alloc(64, padded * sizeof(Float4));
     return true;
 }
 
-static bool water_search(Water *water, int threads, Err *err) {
-    const RowsJob job = {.passes = water->passes,
-                         .grid = &water->grid,
-                         .particles = &water->particles,
-                         .kernel = &water->kernel,
-                         .volume = water->volume,
+static bool tank_search(Tank *tank, int threads, Err *err) {
+    const RowsJob job = {.passes = tank->passes,
+                         .grid = &tank->grid,
+                         .particles = &tank->particles,
+                         .kernel = &tank->kernel,
+                         .volume = tank->volume,
                          .threads = threads};
-    return rows_build(&water->rows, &job, err);
+    return rows_build(&tank->rows, &job, err);
 }
 
 static const Passes *best_passes(void) {
@@ -70,49 +70,48 @@ static const Passes *best_passes(void) {
 
 typedef enum Pass { ACCELERATE, DIVERGENCE, STRAIN, VISCOSITY, CALMING, PASS_COUNT } Pass;
 
-static void run_block(const Water *water, Pass pass, uint32_t block) {
-    const PairData *pairs = &water->rows.pairs;
-    const Float4 *velocity = (const Float4 *)water->particles.velocity;
-    ForceJob force = {.pairs = pairs, .velocity = velocity, .result = water->vector, .viscosity = 0.02f};
+static void run_block(const Tank *tank, Pass pass, uint32_t block) {
+    const PairData *pairs = &tank->rows.pairs;
+    const Float4 *velocity = (const Float4 *)tank->particles.velocity;
+    ForceJob force = {.pairs = pairs, .velocity = velocity, .result = tank->vector, .viscosity = 0.02f};
     switch (pass) {
     case ACCELERATE:
-        water->passes->accelerate(pairs,
-                                  &(AccelerateJob){.operand = (const Float4 *)water->operand,
-                                                   .scale = 1.0f,
-                                                   .result = water->vector},
-                                  block);
+        tank->passes->accelerate(
+            pairs,
+            &(AccelerateJob){.operand = (const Float4 *)tank->operand, .scale = 1.0f, .result = tank->vector},
+            block);
         break;
     case DIVERGENCE:
-        water->passes->divergence(pairs, velocity, water->result, block);
+        tank->passes->divergence(pairs, velocity, tank->result, block);
         break;
     case STRAIN:
-        water->passes->strain(
+        tank->passes->strain(
             &(StrainJob){.pairs = pairs,
                          .velocity = velocity,
-                         .gradient = {water->gradient[0], water->gradient[1], water->gradient[2]}},
+                         .gradient = {tank->gradient[0], tank->gradient[1], tank->gradient[2]}},
             block);
         break;
     case CALMING:
         force.calming = 1.0f;
         force.calming_limit = 0.003f;
         for (int k = 0; k < 3; k++)
-            force.gradient[k] = (const Float4 *)water->gradient[k];
-        water->passes->forces(&force, block);
+            force.gradient[k] = (const Float4 *)tank->gradient[k];
+        tank->passes->forces(&force, block);
         break;
     default:
-        water->passes->forces(&force, block);
+        tank->passes->forces(&force, block);
         break;
     }
 }
 
-static double time_pass(const Water *water, Pass pass, int threads) {
-    const uint32_t blocks = particles_blocks(&water->particles);
+static double time_pass(const Tank *tank, Pass pass, int threads) {
+    const uint32_t blocks = particles_blocks(&tank->particles);
     double best = 1e30;
     for (int repeat = 0; repeat < REPEATS; repeat++) {
         const double begin = timer_ms();
 #pragma omp parallel for schedule(static) num_threads(threads)
         for (uint32_t block = 0; block < blocks; block++)
-            run_block(water, pass, block);
+            run_block(tank, pass, block);
         const double ms = timer_ms() - begin;
         best = ms < best ? ms : best;
     }
@@ -127,10 +126,10 @@ int main(int argc, char **argv) {
         return 2;
     }
     Err err = {0};
-    Water water = {.kernel = kernel_make(0.1), .volume = 1e-4f, .passes = best_passes()};
+    Tank tank = {.kernel = kernel_make(0.1), .volume = 1e-4f, .passes = best_passes()};
     const GridBounds domain = {{-1, -1, -1}, {1e4f, 1e4f, 1e4f}};
-    if (!water_make(&water, edge, layers, &err) ||
-        !grid_sort(&water.grid, &water.particles, water.kernel.support, &domain, NULL, 1, &err)) {
+    if (!tank_make(&tank, edge, layers, &err) ||
+        !grid_sort(&tank.grid, &tank.particles, tank.kernel.support, &domain, NULL, 1, &err)) {
         fprintf(stderr, "%s\n", err.message);
         return 1;
     }
@@ -139,7 +138,7 @@ int main(int argc, char **argv) {
         search[threads] = 1e30;
         for (int repeat = 0; repeat < REPEATS; repeat++) {
             const double begin = timer_ms();
-            if (!water_search(&water, threads, &err)) {
+            if (!tank_search(&tank, threads, &err)) {
                 fprintf(stderr, "%s\n", err.message);
                 return 1;
             }
@@ -147,27 +146,27 @@ int main(int argc, char **argv) {
             search[threads] = ms < search[threads] ? ms : search[threads];
         }
     }
-    const PairData *pairs = &water.rows.pairs;
+    const PairData *pairs = &tank.rows.pairs;
     uint64_t entries = 0, neighbours = 0;
     for (uint32_t i = 0; i < pairs->count; i++) {
-        float *v = water.particles.velocity[i];
-        v[3] = vector_moment(pairs, water.particles.position[i], v);
-        memcpy(water.operand[i], water.particles.position[i], sizeof(Float4));
-        water.operand[i][3] = 0.001f;
-        neighbours += water.rows.neighbours[i];
+        float *v = tank.particles.velocity[i];
+        v[3] = vector_moment(pairs, tank.particles.position[i], v);
+        memcpy(tank.operand[i], tank.particles.position[i], sizeof(Float4));
+        tank.operand[i][3] = 0.001f;
+        neighbours += tank.rows.neighbours[i];
     }
     for (uint32_t slice = 0; slice < (pairs->count + SLICE - 1) / SLICE; slice++)
-        entries += pairs->slice_length[slice];
+        entries += pairs->slices[slice].length;
     printf("%u particles, %.1f neighbours each, padding %.2f, %s\n", pairs->count,
            (double)neighbours / pairs->count, (double)entries * SLICE / (double)neighbours,
-           water.passes->name);
+           tank.passes->name);
     printf("%-12s %10s %10s %8s %14s\n", "pass", "1 thread", "2 threads", "gain", "ns an entry");
     static const char *const names[PASS_COUNT] = {"accelerate", "divergence", "strain", "viscosity",
                                                   "calming"};
     printf("%-12s %7.2f ms %7.2f ms %8.2f %14.2f\n", "search", search[1], search[2], search[1] / search[2],
            2e6 * search[2] / (double)entries);
     for (int pass = 0; pass < PASS_COUNT; pass++) {
-        const double one = time_pass(&water, (Pass)pass, 1), two = time_pass(&water, (Pass)pass, 2);
+        const double one = time_pass(&tank, (Pass)pass, 1), two = time_pass(&tank, (Pass)pass, 2);
         printf("%-12s %7.2f ms %7.2f ms %8.2f %14.2f\n", names[pass], one, two, one / two,
                2e6 * two / (double)entries);
     }

@@ -26,6 +26,7 @@ typedef struct Experiment {
     const char *name;
     const char *folder;
     int threads;
+    double radius; /* m; of programs that take --radius */
     int failures;
     double start; /* s, monotonic */
     FileWriter table;
@@ -47,17 +48,24 @@ static inline void experiment_need(bool good, const Err *err) {
     exit((int)err->code);
 }
 
-static inline Experiment experiment_begin(const char *name, int argc, char **argv) {
-    Experiment experiment = {
-        .name = name, .folder = "out/experiments", .threads = 1, .start = experiment_clock()};
+/* With --radius R for particles of another size than `radius`; NaN: there is no such option. */
+static inline Experiment experiment_begin_sized(const char *name, double radius, int argc, char **argv) {
+    Experiment experiment = {.name = name,
+                             .folder = "out/experiments",
+                             .threads = 1,
+                             .radius = radius,
+                             .start = experiment_clock()};
     for (int k = 1; k < argc; k++) {
         const bool has_value = k + 1 < argc;
         if (has_value && strcmp(argv[k], "--threads") == 0) {
             experiment.threads = atoi(argv[++k]);
         } else if (has_value && strcmp(argv[k], "--out") == 0) {
             experiment.folder = argv[++k];
+        } else if (has_value && !isnan(radius) && strcmp(argv[k], "--radius") == 0) {
+            experiment.radius = atof(argv[++k]);
         } else {
-            fprintf(stderr, "usage: exp_%s [--threads N] [--out DIR]\n", name);
+            fprintf(stderr, "usage: exp_%s [--threads N] [--out DIR]%s\n", name,
+                    isnan(radius) ? "" : " [--radius R]");
             exit(ERR_USAGE);
         }
     }
@@ -70,6 +78,10 @@ static inline Experiment experiment_begin(const char *name, int argc, char **arg
     setvbuf(stdout, NULL, _IOLBF, 0);
     printf("%s\n%-52s %12s %12s %12s %-7s\n", name, "", "measured", "expected", "tolerance", "unit");
     return experiment;
+}
+
+static inline Experiment experiment_begin(const char *name, int argc, char **argv) {
+    return experiment_begin_sized(name, (double)NAN, argc, argv);
 }
 
 static inline int experiment_end(Experiment *experiment) {
@@ -108,6 +120,11 @@ static inline void experiment_limit(Experiment *experiment, const char *name, do
     snprintf(text, sizeof text, "%s <=", name);
     experiment->failures += !good;
     experiment_row(experiment, text, measured, limit, NAN, unit, good ? "PASS" : "FAIL");
+}
+
+static inline void experiment_within(Experiment *experiment, const char *name, double measured, double low,
+                                     double high, const char *unit) {
+    experiment_check(experiment, name, measured, 0.5 * (low + high), 0.5 * (high - low), unit);
 }
 
 static inline void experiment_aim(Experiment *experiment, const char *name, double measured, double aim,

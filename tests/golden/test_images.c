@@ -283,10 +283,43 @@ static void window_moves_are_not_seen(void **state) {
     gfx_destroy(gfx);
 }
 
+/* Seen from outside, the ocean hides what lies below its surface in the window, also where the particles' rim
+ * is missing: the lower half of the picture shows the sea in front of the window, with particles or without.
+ */
+static void under_the_rim_nothing_is_seen(void **state) {
+    (void)state;
+    GfxScene scene = sea->scene;
+    float *fade = malloc(scene.particles.count * sizeof *fade);
+    assert_non_null(fade);
+    for (uint32_t i = 0; i < scene.particles.count; i++)
+        fade[i] = hypotf(sea->position[i][0], sea->position[i][2]) < 1.05f ? 1.0f : 0.0f;
+    scene.particles.fade = fade;
+    memcpy(scene.camera.eye, (float[3]){-4.0f, 0.8f, 0.0f}, sizeof scene.camera.eye);
+    memcpy(scene.camera.target, (float[3]){-1.8f, 0.0f, 0.0f}, sizeof scene.camera.target);
+    Gfx *gfx = open_gfx_or_skip(GFX_LOOK_WATER, 0);
+    draw(gfx, &scene, drawn.rgb[0]);
+    scene.particles.count = 0;
+    draw(gfx, &scene, drawn.rgb[1]);
+    gfx_destroy(gfx);
+    free(fade);
+    int most = 0, beyond = 0;
+    for (int i = 0; i < SIZE; i++) {
+        int step = abs(drawn.rgb[0][i] - drawn.rgb[1][i]);
+        int *largest = i >= 3 * WIDTH * (HEIGHT / 2 + 3) ? &most : &beyond;
+        *largest = step > *largest ? step : *largest;
+    }
+    print_message("in front of the window %d, beyond its edge %d\n", most, beyond);
+    assert_true(most <= 2);
+    assert_true(beyond > 30);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(images_are_those_stored), cmocka_unit_test(contexts_agree_bit_for_bit),
-        cmocka_unit_test(images_repeat),           cmocka_unit_test(window_moves_are_not_seen),
+        cmocka_unit_test(images_are_those_stored),
+        cmocka_unit_test(contexts_agree_bit_for_bit),
+        cmocka_unit_test(images_repeat),
+        cmocka_unit_test(window_moves_are_not_seen),
+        cmocka_unit_test(under_the_rim_nothing_is_seen),
         cmocka_unit_test(a_missing_pass_is_seen),
     };
     return cmocka_run_group_tests_name("images", tests, set_up, tear_down);

@@ -1,5 +1,5 @@
-/* A window that moves gives the same state whatever computes it, also after a save and resume, and keeps its
- * water.
+/* A window that moves, with an edge of water or of walls, gives the same state whatever computes it, also
+ * after a save and resume, and keeps its water.
  *
  * Scene: a small star-shaped window over 0.4 m of still water follows a floating crate that is pulled, 120
  * steps with several moves, absorption on. */
@@ -9,7 +9,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 
-#include "skiff.h"
+#include "engine/sim.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -18,12 +18,27 @@
 
 enum { STEPS = 120 };
 
-static SkiffSim *make(int threads, SkiffSimd simd, double start) {
+static const float pillar_size[3] = {0.6f, 2.0f, 1.2f}; /* m */
+
+static SkiffBodyDef fixed_box(const char *name, const float size[3], float x, float z) {
+    SkiffBodyDef box = skiff_body_default();
+    box.name = name;
+    box.geometry.kind = SKIFF_GEOMETRY_BOX;
+    memcpy(box.geometry.size, size, sizeof box.geometry.size);
+    box.geometry.translation[0] = x;
+    box.geometry.translation[1] = 0.5f;
+    box.geometry.translation[2] = z;
+    box.free_axes = 0;
+    return box;
+}
+
+static SkiffSim *make_sea(int threads, SkiffSimd simd, double start, bool has_fixed, int edge) {
     static const double pull = 2.6; /* m/s */
     SkiffDef def = skiff_def_default();
     Err err = {0};
     def.threads = threads;
     def.simd = simd;
+    def.params.window_edge = edge;
     def.params.particle_radius = 0.04f;
     def.params.time_step = 0.005f;
     def.params.sea_steps = 10;
@@ -48,12 +63,18 @@ static SkiffSim *make(int threads, SkiffSimd simd, double start) {
     crate.density = 500.0f;
     crate.free_axes = SKIFF_FREE_ALL & ~SKIFF_FREE_X;
     crate.velocity[0] = (float)pull;
-    def.bodies = &crate;
-    def.body_count = 1;
+    const SkiffBodyDef bodies[3] = {crate, fixed_box("pillar", pillar_size, 1.9f, 1.1f),
+                                    fixed_box("rock", pillar_size, -2e4f, 3e4f)};
+    def.bodies = bodies;
+    def.body_count = has_fixed ? 3 : 1;
     SkiffSim *sim = skiff_create(&def, &err);
     if (sim == NULL)
         fail_msg("%s", err.message);
     return sim;
+}
+
+static SkiffSim *make(int threads, SkiffSimd simd, double start) {
+    return make_sea(threads, simd, start, false, WINDOW_EDGE_WATER);
 }
 
 static void run(SkiffSim *sim, int steps) {
@@ -63,8 +84,8 @@ static void run(SkiffSim *sim, int steps) {
             fail_msg("%s", err.message);
 }
 
-static uint64_t hash_of(int threads, SkiffSimd simd) {
-    SkiffSim *sim = make(threads, simd, 0.0);
+static uint64_t hash_of(int threads, SkiffSimd simd, int edge) {
+    SkiffSim *sim = make_sea(threads, simd, 0.0, false, edge);
     run(sim, STEPS);
     SkiffWindow window;
     assert_true(skiff_window(sim, &window));
@@ -76,9 +97,11 @@ static uint64_t hash_of(int threads, SkiffSimd simd) {
 
 static void test_threads_and_instruction_sets(void **state) {
     (void)state;
-    const uint64_t expected = hash_of(1, SKIFF_SIMD_PLAIN);
+    const uint64_t expected = hash_of(1, SKIFF_SIMD_PLAIN, WINDOW_EDGE_WATER);
     for (int threads = 2; threads <= 3; threads++)
-        assert_int_equal(hash_of(threads, SKIFF_SIMD_AUTO), expected);
+        assert_int_equal(hash_of(threads, SKIFF_SIMD_AUTO, WINDOW_EDGE_WATER), expected);
+    assert_int_equal(hash_of(3, SKIFF_SIMD_AUTO, WINDOW_EDGE_WALLS),
+                     hash_of(1, SKIFF_SIMD_PLAIN, WINDOW_EDGE_WALLS));
 }
 
 static void test_save_and_resume(void **state) {
@@ -138,12 +161,41 @@ static void test_far_away(void **state) {
     skiff_destroy(far);
 }
 
+/* Bodies that stay in the world while the window sails past or away from them: one comes in across the edge
+ * and leaves behind, one is so far that cells over both would not fit into memory. */
+static void test_fixed_bodies(void **state) {
+    (void)state;
+    SkiffSim *sim = make_sea(2, SKIFF_SIMD_AUTO, 0.0, true, WINDOW_EDGE_WATER);
+    const SkiffBody pillar = skiff_body(sim, 1);
+    double deepest = -INFINITY, force = 0.0;
+    for (int k = 0; k < 3 * STEPS; k++) {
+        run(sim, 1);
+        const SkiffParticles water = skiff_particles(sim);
+        for (uint32_t i = 0; i < water.count; i++) {
+            double inside = INFINITY;
+            for (int c = 0; c < 3; c++) {
+                const double at = (double)water.position[i][c] + water.origin[c] - pillar.position[c];
+                inside = fmin(inside, 0.5 * (double)pillar_size[c] - fabs(at));
+            }
+            deepest = fmax(deepest, inside);
+        }
+        force = fmax(force, fabs(skiff_body(sim, 1).force[1]));
+        force = fmax(force, fabs(skiff_body(sim, 1).force[2]));
+    }
+    assert_true(force > 1.0);                        /* there was water around it */
+    assert_true(deepest < 0.04);                     /* and none in it */
+    assert_true(skiff_body(sim, 1).force[2] == 0.0); /* the window has left it */
+    assert_true(skiff_body(sim, 1).position[0] == pillar.position[0]);
+    skiff_destroy(sim);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_threads_and_instruction_sets),
         cmocka_unit_test(test_save_and_resume),
         cmocka_unit_test(test_ledger),
         cmocka_unit_test(test_far_away),
+        cmocka_unit_test(test_fixed_bodies),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

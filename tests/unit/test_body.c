@@ -130,6 +130,61 @@ static void test_release(void **state) {
     body_free(&body);
 }
 
+/* It stays where it is from the stop on, in every axis. */
+static void test_stop(void **state) {
+    (void)state;
+    SkiffBodyDef def = skiff_body_default();
+    Body body;
+    Err err = {0};
+    def.name = "stopped";
+    def.geometry.kind = SKIFF_GEOMETRY_SPHERE;
+    def.geometry.radius = 0.5f;
+    def.free_axes = SKIFF_FREE_Y;
+    def.velocity[0] = 2.0f;
+    def.angular_velocity[1] = 1.0f;
+    def.stop_time = 0.5;
+    assert_true(body_make(&def, "RigidBodies[0]", &body, &err));
+    const float gravity[3] = {0, -9.81f, 0};
+    for (int k = 0; k < 50; k++)
+        step(&body, gravity, k * 1e-2, 1e-2);
+    assert_float_equal(body.position[0], 1.0, 1e-6);
+    assert_true(body.position[1] < -1.2);
+    const Body before = body;
+    for (int k = 50; k < 100; k++)
+        step(&body, gravity, k * 1e-2, 1e-2);
+    assert_memory_equal(body.position, before.position, sizeof body.position);
+    assert_memory_equal(body.rotation, before.rotation, sizeof body.rotation);
+    body_free(&body);
+    def.release_time = 0.5;
+    assert_false(body_make(&def, "RigidBodies[0]", &body, &err));
+    assert_string_equal(err.message, "RigidBodies[0].stopTime: 0.5 s, must be after the release at 0.5 s");
+}
+
+/* A prescribed velocity that rises within a time covers half of what it covers in the same time at its
+ * value, and what is free has its velocity at once. */
+static void test_ramp(void **state) {
+    (void)state;
+    SkiffBodyDef def = skiff_body_default();
+    Body body;
+    Err err = {0};
+    def.name = "towed";
+    def.geometry.kind = SKIFF_GEOMETRY_SPHERE;
+    def.geometry.radius = 0.5f;
+    def.free_axes = SKIFF_FREE_Z;
+    def.velocity[0] = 2.0f;
+    def.velocity[2] = 3.0f;
+    def.ramp_time = 0.5;
+    assert_true(body_make(&def, "RigidBodies[0]", &body, &err));
+    const float gravity[3] = {0, -9.81f, 0};
+    for (int k = 0; k < 50; k++)
+        step(&body, gravity, k * 1e-2, 1e-2);
+    assert_float_equal(body.position[0], 0.5, 1e-4);
+    assert_float_equal(body.position[2], 1.5, 1e-6);
+    step(&body, gravity, 0.5, 1e-2);
+    assert_float_equal(body.velocity[0], 2.0, 1e-12);
+    body_free(&body);
+}
+
 static void test_bad(void **state) {
     (void)state;
     const struct {
@@ -160,7 +215,8 @@ static void test_bad(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_mass), cmocka_unit_test(test_free_fall), cmocka_unit_test(test_tumbling),
-        cmocka_unit_test(test_axes), cmocka_unit_test(test_release),   cmocka_unit_test(test_bad),
+        cmocka_unit_test(test_axes), cmocka_unit_test(test_release),   cmocka_unit_test(test_stop),
+        cmocka_unit_test(test_ramp), cmocka_unit_test(test_bad),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

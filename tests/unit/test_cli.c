@@ -165,7 +165,7 @@ static void usage_mistakes_exit_with_2(void **state) {
         {"rest mkae", "skiff rest: unknown command mkae, did you mean make?\nTry 'skiff rest --help'.\n"},
         {"help rest mkae", "skiff rest: unknown command mkae, did you mean make?\n"},
         {"reproduce carensac2023 tabel1",
-         "skiff reproduce carensac2023: expected table1, fig2, fig4c or all, found \"tabel1\"\n"},
+         "skiff reproduce carensac2023: expected table1, fig2, fig4c, fig5, boat or all, found \"tabel1\"\n"},
         {"reproduce carensac2023 --runs 0",
          "skiff reproduce carensac2023: --runs: expected an integer from 1 to 10000, found \"0\"\n"},
         {"rest make tile", "skiff rest make: takes options only, \"tile\" is given\n"},

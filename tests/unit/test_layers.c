@@ -38,7 +38,7 @@ static const struct Layer {
     {"engine/passes.c", " engine/ ", " cglm/ xxhash.h omp.h immintrin.h arm_neon.h "},
     {"engine/base/", " engine/base/ ", " xxhash.h sanitizer/asan_interface.h "},
     {"engine/", " engine/ ", " cglm/ xxhash.h omp.h "},
-    {"render/", " render/ engine/base/ generated/ ", " cglm/ GL/ EGL/ KHR/ png.h stb/ "},
+    {"render/", " render/ engine/base/ generated/ ", " cglm/ omp.h GL/ EGL/ KHR/ png.h stb/ "},
     {"app/", " app/ engine/skiff.h engine/base/ render/gfx.h generated/ ", " cglm/ jansson.h omp.h "},
 };
 

@@ -1,6 +1,8 @@
 /* Tables beside a paper's figures, and the set-ups of [Carensac2023]: what is in them, that the engine takes
  * them. */
 #include "app/carensac.h"
+#include "app/carried.h"
+#include "app/series.h"
 #include "app/svg.h"
 #include "engine/base/file.h"
 #include "engine/shape.h"
@@ -254,17 +256,70 @@ static void the_cube_floats_half_immersed_on_an_edge(void **state) {
     assert_float_equal(max[0], 1, 1e-5);
 }
 
+/* From 0.586 m above the water through the floor, wider than the corridor: [Carensac2023] 5.6 as its authors'
+ * code has it. */
 static void the_wedge_parts_the_corridor(void **state) {
     (void)state;
-    CarensacSetup setup;
+    Err err = {0};
     float min[3], max[3];
-    carensac_set_up_wedge(&setup);
-    assert_float_equal(shape_volume(&setup.body.geometry, min, max), 7.05, 0.02);
+    Scene *scene = scene_load(SKIFF_SOURCE_DIR "/assets/scenes/wedge.json", NULL, 0, &err);
+    if (!scene)
+        fail_msg("%s", err.message);
+    const SkiffBodyDef *wedge = &scene->def.bodies[0];
+    assert_float_equal(shape_volume(&wedge->geometry, min, max), 7.05, 0.02);
     assert_float_equal(min[1], 1.586, 1e-3);
     assert_float_equal(max[1], 5.414, 1e-3);
     assert_float_equal(max[2], 0.566, 1e-3);
     assert_float_equal(max[0], 1, 1e-3);
-    assert_float_equal(shape_volume(&setup.def.tank.geometry, min, max), 50, 1e-3);
+    assert_true(wedge->density == 800 && wedge->stop_time == 0.72);
+    assert_float_equal(shape_volume(&scene->def.tank.geometry, min, max), 50, 1e-3);
+    assert_true(scene->def.sea.has_region && scene->def.sea.region_min[2] == 4.5f);
+    scene_free(scene);
+}
+
+/* What the program carries is what the files say. */
+static void carried_scenes_are_the_files(void **state) {
+    (void)state;
+    static const char *const names[] = {"wedge.json", "boat-cylinder-5m.json", "boat-cylinder-2.5m.json"};
+    for (size_t k = 0; k < sizeof names / sizeof *names; k++) {
+        Err err = {0};
+        char path[4096];
+        snprintf(path, sizeof path, SKIFF_SOURCE_DIR "/assets/scenes/%s", names[k]);
+        Scene *carried = carried_scene(names[k], NULL, 0, &err), *file = scene_load(path, NULL, 0, &err);
+        if (!carried || !file)
+            fail_msg("%s", err.message);
+        assert_int_equal(carried->def.body_count, file->def.body_count);
+        assert_memory_equal(&carried->def.params, &file->def.params, sizeof file->def.params);
+        assert_string_equal(carried->title, file->title);
+        scene_free(carried);
+        scene_free(file);
+    }
+}
+
+static void a_series_grows_and_is_written(void **state) {
+    (void)state;
+    Series series;
+    CsvTable table;
+    Err err = {0};
+    char path[4200];
+    assert_true(series_make(&series, "t,a_ms", &err));
+    for (int k = 0; k < 3000; k++) {
+        double *row = series_add(&series, &err);
+        assert_non_null(row);
+        assert_true(isnan(row[1]));
+        row[0] = k;
+        if (k % 2)
+            row[1] = 0.5 * k;
+    }
+    snprintf(path, sizeof path, "%s/series.csv", folder);
+    assert_true(series_write(&series, path, &err));
+    assert_true(csv_read(path, &table, &err));
+    assert_int_equal(table.row_count, 3000);
+    assert_int_equal(csv_column(&table, "a_ms"), 1);
+    assert_true(table.values[2 * 2999 + 1] == 1499.5 && isnan(table.values[2 * 2998 + 1]));
+    csv_free(&table);
+    series_free(&series);
+    unlink(path);
 }
 
 static void offsets_cover_a_diameter_on_both_sides(void **state) {
@@ -296,6 +351,8 @@ int main(void) {
         cmocka_unit_test(set_ups_have_the_paper_s_sizes),
         cmocka_unit_test(the_cube_floats_half_immersed_on_an_edge),
         cmocka_unit_test(the_wedge_parts_the_corridor),
+        cmocka_unit_test(carried_scenes_are_the_files),
+        cmocka_unit_test(a_series_grows_and_is_written),
         cmocka_unit_test(offsets_cover_a_diameter_on_both_sides),
     };
     return cmocka_run_group_tests_name("reproduce", tests, make_folder, remove_folder);

@@ -285,7 +285,7 @@ static const char full[] =
     "\"repeat\": 4}],"
     " \"RigidBodies\": ["
     "  {\"name\": \"crate\", \"box\": [1, 2, 3], \"density\": 600, \"isDynamic\": true, \"releaseTime\": "
-    "1.5},"
+    "1.5, \"stopTime\": 4, \"rampTime\": 0.25},"
     "  {\"name\": \"ball\", \"sphere\": 0.5, \"mass\": 4, \"isDynamic\": true, \"freeAxes\": [\"y\", "
     "\"rx\"]},"
     "  {\"name\": \"hull\", \"geometryFile\": \"hull.obj\", \"scale\": [2, 2, 2], \"translation\": [1, 2, 3],"
@@ -339,6 +339,8 @@ static void bodies_and_probes_reach_the_def(void **state) {
     assert_int_equal(bodies[0].geometry.kind, SKIFF_GEOMETRY_BOX);
     assert_vec3(bodies[0].geometry.size, 1, 2, 3);
     assert_true(bodies[0].density == 600 && bodies[0].mass == 0 && bodies[0].release_time == 1.5);
+    assert_true(bodies[0].stop_time == 4 && bodies[0].ramp_time == 0.25);
+    assert_true(isinf(bodies[1].stop_time) && bodies[1].ramp_time == 0);
     assert_int_equal(bodies[0].free_axes, SKIFF_FREE_ALL);
     assert_int_equal(bodies[1].geometry.kind, SKIFF_GEOMETRY_SPHERE);
     assert_true(bodies[1].geometry.radius == 0.5f && bodies[1].mass == 4);

@@ -529,6 +529,7 @@ static const struct {
     const char *materials; /* all, in the order of the file */
 } meshes[] = {
     {"boat.obj", 3.3716, {768.3, 2319, 2180}, "hull bottom stripe deck cabin glass"},
+    {"blunt.obj", 2.9416, {620.1, 2195, 1884}, "hull deck"},
     {"buoy.obj", 0.2688, {18.79, 23.61, 18.79}, "body ring mark"},
     {"crate.obj", 0.1660, {7.084, 11.60, 8.865}, "wood iron"},
     {"harbour.obj", 51.5783, {48520, 435590, 437850}, "stone coping iron white red lamp"},

@@ -1,0 +1,33 @@
+/* The parts of `skiff reproduce carensac2023` that run a simulation over time: what they share, and what each
+ * gives besides its sheet. reproduce.c has the list. */
+#ifndef SKIFF_APP_REPRODUCE_H
+#define SKIFF_APP_REPRODUCE_H
+
+#include "cli.h"
+#include "machine.h"
+#include "series.h"
+#include "sheet.h"
+
+typedef struct ReproduceJob {
+    const CliArgs *args;
+    Sheet *sheet;       /* with the paper's rows, to be given runs */
+    const char *folder; /* for files that a set-up needs */
+    Machine *machine;   /* described by the first simulation */
+} ReproduceJob;
+
+enum { REPRODUCE_BOAT_WINDOWS = 2 };
+
+/* --radius, or without it the standard one, m. */
+double reproduce_radius(const CliArgs *args, double standard);
+/* A line of progress on stderr, twenty times on the way to `end` (s). */
+void reproduce_tell(const ReproduceJob *job, const char *row, const SkiffSim *sim, double end);
+
+/* fig5 [Carensac2023 sec. 5.6]: series of every step. */
+bool reproduce_wedge(const ReproduceJob *job, Series *series, Err *err);
+void reproduce_wedge_charts(FILE *out, const Series *series);
+
+/* boat [Carensac2023 sec. 5.7]: a series for each row of the sheet. */
+bool reproduce_boat(const ReproduceJob *job, Series series[REPRODUCE_BOAT_WINDOWS], Err *err);
+void reproduce_boat_charts(FILE *out, const Sheet *sheet, const Series series[REPRODUCE_BOAT_WINDOWS]);
+
+#endif

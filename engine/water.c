@@ -1,0 +1,255 @@
+/* The surface is made from the tile: cut, its upper part settles (rest_settle_column) over the rest of it. A
+ * column is that surface with the tile below, which is at rest as it comes. */
+#include "water.h"
+#include "sim.h"
+
+#include <math.h>
+
+/* ---- Making ---- */
+
+typedef struct Column {
+    TileBox box;
+    uint32_t count;
+    float (*position)[3];
+    uint32_t *source;
+} Column;
+
+static bool lay_column(SkiffSim *sim, double period, float depth, Column *column, Err *err) {
+    uint64_t count;
+    column->box = (TileBox){.radius = (double)sim->params.particle_radius,
+                            .min = {0.0, -(double)depth, 0.0},
+                            .max = {period, 0.0, period}};
+    if (!tile_count_box(&sim->tile, &column->box, &count, err))
+        return false;
+    if (count > 100000000u)
+        return err_set(err, ERR_INPUT, "a column of %.4g m of water takes %.4g particles", (double)depth,
+                       (double)count);
+    if (!buffer_reserve(&sim->rest.laid, "points to fill", (size_t)count * sizeof(float[3]), err) ||
+        !buffer_reserve(&sim->rest.source, "sources of points", (size_t)count * sizeof(uint32_t), err))
+        return false;
+    column->count = (uint32_t)count;
+    column->position = sim->rest.laid.data;
+    column->source = sim->rest.source.data;
+    tile_fill_box(&sim->tile, &column->box, (const double[3]){0}, column->position, column->source);
+    return true;
+}
+
+/* P of still water, of a depth of a radius at least. */
+static float still_pressure(const SkiffSim *sim, float y) {
+    const float dt = sim->params.time_step;
+    return sim->params.gravity[1] * fminf(y, -sim->params.particle_radius) * dt * dt;
+}
+
+static bool list_add(WaterList *list, const float position[3], const float pressure[2], Err *err) {
+    RestFitted *water = &list->water;
+    if (water->count == list->capacity) {
+        const uint32_t capacity = 4096 + 2 * list->capacity;
+        if (!buffer_reserve(&list->position, "water at rest", capacity * sizeof(Float4), err) ||
+            !buffer_reserve(&list->pressure, "pressure of water at rest", capacity * sizeof(float[2]), err))
+            return false;
+        list->capacity = capacity;
+        water->position = list->position.data;
+        water->pressure = list->pressure.data;
+    }
+    memcpy(water->position[water->count], position, 3 * sizeof(float));
+    water->position[water->count][3] = 0.0f;
+    memcpy(water->pressure[water->count++], pressure, sizeof(float[2]));
+    return true;
+}
+
+static uint32_t cell_of(const StillWater *water, const float p[3]) {
+    int32_t c[3];
+    for (int k = 0; k < 3; k++) {
+        const int32_t last = (k == 1 ? water->layers : water->across) - 1;
+        const float from = k == 1 ? water->top - p[1] : p[k];
+        c[k] = (int32_t)floorf(from / water->cell);
+        c[k] = c[k] < 0 ? 0 : c[k] > last ? last : c[k];
+    }
+    return (uint32_t)((c[0] * water->across + c[2]) * water->layers + c[1]);
+}
+
+static bool sort_column(StillWater *water, const WaterList *list, Err *err) {
+    const uint32_t cells = (uint32_t)(water->across * water->across * water->layers), n = list->water.count;
+    if (!buffer_reserve(&water->position, "column of water", n * sizeof(Float4), err) ||
+        !buffer_reserve(&water->pressure, "pressure of the column", n * sizeof(float[2]), err) ||
+        !buffer_reserve(&water->start_buffer, "cells of the column", (cells + 2) * sizeof(uint32_t), err))
+        return false;
+    water->column = (RestFitted){n, water->position.data, water->pressure.data};
+    uint32_t *start = water->start_buffer.data;
+    for (uint32_t i = 0; i < n; i++)
+        start[cell_of(water, list->water.position[i]) + 2]++;
+    for (uint32_t c = 0; c < cells; c++)
+        start[c + 2] += start[c + 1];
+    for (uint32_t i = 0; i < n; i++) {
+        const uint32_t to = start[cell_of(water, list->water.position[i]) + 1]++;
+        memcpy(water->column.position[to], list->water.position[i], sizeof(Float4));
+        memcpy(water->column.pressure[to], list->water.pressure[i], sizeof(float[2]));
+    }
+    water->start = start;
+    return true;
+}
+
+/* y of a surface's floor: a radius below what settles, so that nobody sinks through it. */
+static float surface_floor(const SkiffSim *sim) {
+    return -WATER_SETTLED * sim->kernel.support - sim->params.particle_radius;
+}
+
+/* The tile below, the surface above. */
+static bool list_column(const SkiffSim *sim, const Column *column, const RestTile *surface, WaterList *list,
+                        Err *err) {
+    const float r = sim->params.particle_radius, bottom = -WATER_SETTLED * sim->kernel.support;
+    const float floor = surface_floor(sim);
+    for (uint32_t i = 0; i < column->count; i++) {
+        const float *p = column->position[i];
+        const float pressure[2] = {still_pressure(sim, p[1]) * sim->tile.share[column->source[i]], 0.0f};
+        if (p[1] < bottom && !list_add(list, p, pressure, err))
+            return false;
+    }
+    for (uint32_t i = 0; i < surface->count; i++) {
+        const float p[3] = {r * surface->position[i][0], floor + r * surface->position[i][1],
+                            r * surface->position[i][2]};
+        const float pressure[2] = {still_pressure(sim, p[1]) * surface->share[i], 0.0f};
+        if (!list_add(list, p, pressure, err))
+            return false;
+    }
+    return true;
+}
+
+bool water_make(StillWater *water, SkiffSim *sim, float depth, Err *err) {
+    const float support = sim->kernel.support;
+    Column column;
+    WaterList list = {0};
+    RestTile surface;
+    if (!tile_load_surface(&surface, err))
+        return false;
+    water->period = (double)sim->tile.size[0] * (double)sim->params.particle_radius;
+    water->across = (int32_t)floor(water->period / (double)support);
+    water->cell = (float)(water->period / water->across);
+    water->top = support;
+    depth = fmaxf(depth, WATER_SETTLED * support) + support;
+    water->layers = (int32_t)ceilf((depth + water->top) / water->cell);
+    const bool good = lay_column(sim, water->period, depth, &column, err) &&
+                      list_column(sim, &column, &surface, &list, err) && sort_column(water, &list, err);
+    tile_free(&surface);
+    water_list_free(&list);
+    return good;
+}
+
+/* ---- The surface ---- */
+
+/* What settles, over a support of the tile that stands still. */
+static bool place_surface(SkiffSim *sim, const Column *column, Err *err) {
+    const float bottom = -WATER_SETTLED * sim->kernel.support;
+    if (!sim_reserve(sim, column->count, err))
+        return false;
+    for (uint32_t i = 0; i < column->count; i++) {
+        const float *p = column->position[i];
+        const uint32_t to = particles_append(&sim->particles, p, (const float[3]){0}, 0.0);
+        sim->particles.pressure[to] = still_pressure(sim, p[1]) * sim->tile.share[column->source[i]];
+        sim->particles.edge[to] = p[1] < bottom ? EDGE_LAID : EDGE_NONE;
+    }
+    return true;
+}
+
+static bool take_surface(const SkiffSim *sim, double period, RestTile *surface, Err *err) {
+    const Particles *particles = &sim->particles;
+    const float r = sim->params.particle_radius, floor = surface_floor(sim);
+    if (!tile_init(surface, particles->count, err))
+        return false;
+    surface->volume_factor = sim->tile.volume_factor;
+    surface->size[0] = surface->size[2] = (float)(period / (double)r);
+    surface->size[1] = (sim->kernel.support - floor) / r;
+    surface->count = 0;
+    for (uint32_t i = 0; i < particles->count; i++) {
+        const float *p = particles->position[i];
+        if (particles->edge[i] != EDGE_NONE)
+            continue;
+        float *to = surface->position[surface->count];
+        for (int k = 0; k < 3; k++)
+            to[k] = fminf((k == 1 ? p[1] - floor : p[k]) / r, nextafterf(surface->size[k], 0.0f));
+        surface->share[surface->count++] = particles->pressure[i] / still_pressure(sim, p[1]);
+    }
+    return true;
+}
+
+bool water_make_surface(SkiffSim *sim, RestTile *surface, Err *err) {
+    const double period = (double)sim->tile.size[0] * (double)sim->params.particle_radius;
+    Column column;
+    SkiffFill fill = {0};
+    *surface = (RestTile){0};
+    const bool good = lay_column(sim, period, (WATER_SETTLED + 1) * sim->kernel.support, &column, err) &&
+                      place_surface(sim, &column, err) && rest_settle_column(sim, period, &fill, err) &&
+                      take_surface(sim, period, surface, err);
+    sim->particles.count = 0;
+    sim->particles.next_id = 0;
+    return good;
+}
+
+/* ---- Looking ---- */
+
+static bool add_cell(const StillWater *water, const WaterPlace *place, const double corner[2], uint32_t cell,
+                     WaterList *list, Err *err) {
+    for (uint32_t i = water->start[cell]; i < water->start[cell + 1]; i++) {
+        const float *at = water->column.position[i];
+        const float p[3] = {(float)(corner[0] + (double)at[0]), place->surface + at[1],
+                            (float)(corner[1] + (double)at[2])};
+        if (place->outside(place->user, p) <= 0.0f && !list_add(list, p, water->column.pressure[i], err))
+            return false;
+    }
+    return true;
+}
+
+/* All cells over one square of the world. */
+static bool add_square(const StillWater *water, const WaterPlace *place, const int64_t square[2],
+                       WaterList *list, Err *err) {
+    /* a little more than half the diagonal: points lie in their cells but for rounding */
+    const float reach = 0.87f * water->cell;
+    double corner[2];
+    int32_t c[2];
+    float centre[3];
+    for (int k = 0; k < 2; k++) {
+        const int64_t turn = (int64_t)floor((double)square[k] / water->across);
+        c[k] = (int32_t)(square[k] - turn * water->across);
+        corner[k] = (double)turn * water->period - place->origin[2 * k];
+        centre[2 * k] = (float)(corner[k] + ((double)c[k] + 0.5) * (double)water->cell);
+    }
+    for (int32_t layer = 0; layer < water->layers; layer++) {
+        centre[1] = place->surface + water->top - ((float)layer + 0.5f) * water->cell;
+        if (centre[1] + 0.5f * water->cell < place->bounds.min[1])
+            break;
+        const uint32_t cell = (uint32_t)((c[0] * water->across + c[1]) * water->layers + layer);
+        if (water->start[cell] == water->start[cell + 1] || place->outside(place->user, centre) > reach)
+            continue;
+        if (!add_cell(water, place, corner, cell, list, err))
+            return false;
+    }
+    return true;
+}
+
+bool water_gather(const StillWater *water, const WaterPlace *place, WaterList *list, Err *err) {
+    int64_t first[2], last[2], square[2];
+    for (int k = 0; k < 2; k++) {
+        const double cell = (double)water->cell, origin = place->origin[2 * k];
+        first[k] = (int64_t)floor(((double)place->bounds.min[2 * k] + origin) / cell);
+        last[k] = (int64_t)floor(((double)place->bounds.max[2 * k] + origin) / cell);
+    }
+    list->water.count = 0;
+    for (square[0] = first[0]; square[0] <= last[0]; square[0]++)
+        for (square[1] = first[1]; square[1] <= last[1]; square[1]++)
+            if (!add_square(water, place, square, list, err))
+                return false;
+    return true;
+}
+
+void water_free(StillWater *water) {
+    buffer_free(&water->position);
+    buffer_free(&water->pressure);
+    buffer_free(&water->start_buffer);
+    *water = (StillWater){0};
+}
+
+void water_list_free(WaterList *list) {
+    buffer_free(&list->position);
+    buffer_free(&list->pressure);
+    *list = (WaterList){0};
+}

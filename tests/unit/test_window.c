@@ -1,0 +1,249 @@
+/* Windows that move: still water does not notice, and whatever goes wrong is said. */
+#include "engine/sim.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+typedef struct Scene {
+    SkiffDef def;
+    SkiffBodyDef body;
+    double path[2][3];
+} Scene;
+
+/* A round window over half a metre of water, a few thousand particles, that is drawn 3 m along x in 2 s. */
+static void scene_make(Scene *scene) {
+    *scene = (Scene){.def = skiff_def_default(), .body = skiff_body_default(), .path = {{0}, {2, 3, 0}}};
+    SkiffDef *def = &scene->def;
+    def->threads = 1;
+    def->params.particle_radius = 0.04f;
+    def->params.time_step = 0.005f;
+    def->params.boundary_offset = 1.15f;
+    def->params.rest_steps = 10;
+    def->tank.geometry.kind = SKIFF_GEOMETRY_CYLINDER;
+    def->tank.geometry.radius = 0.8f;
+    def->tank.geometry.height = 1.2f;
+    def->tank.geometry.translation[1] = 0.6f;
+    def->tank.wet_height = 1.0f;
+    def->sea = (SkiffSeaDef){.on = true, .level = 0.5f, .path = scene->path, .path_count = 2, .absorb = true};
+    scene->body.name = "box";
+    scene->body.geometry.kind = SKIFF_GEOMETRY_BOX;
+    for (int k = 0; k < 3; k++)
+        scene->body.geometry.size[k] = 0.3f;
+    scene->body.geometry.translation[1] = 0.5f;
+    scene->body.free_axes = 0;
+}
+
+static void follow_body(Scene *scene) {
+    scene->def.bodies = &scene->body;
+    scene->def.body_count = 1;
+    scene->def.sea.follow = "box";
+    scene->def.sea.path_count = 0;
+}
+
+static SkiffSim *accept(const Scene *scene) {
+    Err err = {0};
+    SkiffSim *sim = skiff_create(&scene->def, &err);
+    if (sim == NULL)
+        fail_msg("%s", err.message);
+    return sim;
+}
+
+static void step(SkiffSim *sim) {
+    Err err = {0};
+    if (!skiff_step(sim, &err))
+        fail_msg("%s", err.message);
+}
+
+/* Steps until there were `wanted` moves; none of them may be felt. */
+static void expect_silence(SkiffSim *sim, uint64_t wanted) {
+    step(sim);
+    const uint32_t count = skiff_particles(sim).count;
+    const double height = skiff_stats(sim)->mean_height;
+    uint64_t moves = 0;
+    for (int k = 0; k < 500 && moves < wanted; k++) {
+        step(sim);
+        const SkiffStats *stats = skiff_stats(sim);
+        moves += stats->moved;
+        assert_true(stats->max_speed < 0.05);
+        assert_true(stats->density_iterations <= 3); /* the least is 2 */
+        assert_true(fabs(stats->mean_height - height) < 0.002);
+        assert_true(fabs((double)stats->particles / count - 1.0) < 0.02); /* who is in at the ends varies */
+    }
+    assert_int_equal(moves, wanted);
+}
+
+/* The world's water is at rest, wherever it was laid: nothing moves, nothing has to be solved for, and a
+ * window that comes back finds what it left. */
+static void test_still_water(void **state) {
+    (void)state;
+    Scene scene;
+    scene_make(&scene);
+    SkiffSim *sim = accept(&scene);
+    expect_silence(sim, 7);
+    skiff_destroy(sim);
+}
+
+static void test_every_shape(void **state) {
+    (void)state;
+    static const SkiffGeometryKind kinds[] = {SKIFF_GEOMETRY_BOX, SKIFF_GEOMETRY_SPHERE, SKIFF_GEOMETRY_STAR,
+                                              SKIFF_GEOMETRY_CONE};
+    for (size_t k = 0; k < sizeof kinds / sizeof *kinds; k++) {
+        Scene scene;
+        scene_make(&scene);
+        SkiffGeometryDef *tank = &scene.def.tank.geometry;
+        tank->kind = kinds[k];
+        tank->size[0] = tank->size[2] = 1.4f;
+        tank->size[1] = 1.2f;
+        tank->branches = 5;
+        tank->radius = 0.9f;
+        tank->inner_radius = 0.7f;
+        tank->top_radius = 0.6f;
+        tank->translation[1] = kinds[k] == SKIFF_GEOMETRY_SPHERE ? 0.5f : 0.6f;
+        SkiffSim *sim = accept(&scene);
+        expect_silence(sim, 2);
+        skiff_destroy(sim);
+    }
+}
+
+/* Both kinds of edge, the paper's walls and water, keep an old particle where it is in the world. */
+static void test_particles_stay(void **state) {
+    (void)state;
+    for (int edge = WINDOW_EDGE_WALLS; edge <= WINDOW_EDGE_WATER; edge++) {
+        Scene scene;
+        scene_make(&scene);
+        scene.def.params.window_edge = edge;
+        scene.def.params.sea_steps = 10;
+        SkiffSim *sim = accept(&scene);
+        while (skiff_stats(sim)->step == 0 || !skiff_stats(sim)->moved) {
+            const SkiffParticles before = skiff_particles(sim);
+            uint64_t id = UINT64_MAX;
+            double at[3] = {0};
+            for (uint32_t i = 0; i < before.count && id == UINT64_MAX; i++)
+                if (fabsf(before.position[i][0] - 0.2f) < 0.1f && fabsf(before.position[i][2]) < 0.1f) {
+                    id = before.id[i];
+                    for (int k = 0; k < 3; k++)
+                        at[k] = (double)before.position[i][k] + before.origin[k];
+                }
+            step(sim);
+            const SkiffParticles after = skiff_particles(sim);
+            bool found = false;
+            for (uint32_t i = 0; i < after.count && !found; i++) {
+                found = after.id[i] == id;
+                for (int k = 0; k < 3 && found; k++)
+                    assert_true(fabs((double)after.position[i][k] + after.origin[k] - at[k]) < 0.005);
+            }
+            assert_true(found);
+        }
+        skiff_destroy(sim);
+    }
+}
+
+/* An obstacle that the window comes to stands in water that fits it, and is left behind. */
+static void test_path_into_an_obstacle(void **state) {
+    (void)state;
+    Scene scene;
+    scene_make(&scene);
+    scene.body.geometry.translation[0] = 1.5f;
+    scene.body.geometry.size[1] = 1.5f;
+    scene.def.bodies = &scene.body;
+    scene.def.body_count = 1;
+    SkiffSim *sim = accept(&scene);
+    for (int k = 0; k < 400; k++) {
+        step(sim);
+        assert_true(skiff_stats(sim)->max_speed < 3.0);
+        const SkiffParticles particles = skiff_particles(sim);
+        for (uint32_t i = 0; i < particles.count; i++) {
+            const double x = (double)particles.position[i][0] + particles.origin[0] - 1.5;
+            const double z = (double)particles.position[i][2] + particles.origin[2];
+            assert_true(fmax(fabs(x), fabs(z)) > 0.15 - 0.04); /* a radius deep */
+        }
+    }
+    SkiffWindow window;
+    assert_true(skiff_window(sim, &window));
+    assert_true(window.centre[0] > 2.5);
+    skiff_destroy(sim);
+}
+
+/* A path that jumps is followed as fast as the cap allows. */
+static void test_path_that_jumps(void **state) {
+    (void)state;
+    Scene scene;
+    scene_make(&scene);
+    scene.path[0][1] = 2.0; /* the window starts at 0 */
+    scene.path[1][1] = 2.1;
+    SkiffSim *sim = accept(&scene);
+    const double cap = 3.5 * 4.0 * 0.04;
+    SkiffWindow window;
+    for (int k = 1; k <= 3; k++) {
+        step(sim);
+        assert_true(skiff_window(sim, &window));
+        assert_true(fabs(window.centre[0] - k * cap) < 1e-6);
+    }
+    skiff_destroy(sim);
+}
+
+static void test_body_outruns_the_window(void **state) {
+    (void)state;
+    Scene scene;
+    Err err = {0};
+    scene_make(&scene);
+    follow_body(&scene);
+    scene.def.params.window_cap = 0.1f; /* 0.016 m a step */
+    scene.def.params.window_trigger = 0.1f;
+    scene.body.velocity[0] = 20.0f; /* 0.1 m a step */
+    SkiffSim *sim = accept(&scene);
+    int steps = 0;
+    while (steps < 40 && skiff_step(sim, &err))
+        steps++;
+    assert_int_equal(err.code, ERR_DIVERGED);
+    assert_non_null(strstr(err.message, "body 'box' has left the window by"));
+    assert_non_null(strstr(err.message, "windowCap"));
+    assert_true(steps >= 5 && steps <= 15); /* it gains 0.084 m a step on a window of 0.8 m */
+    skiff_destroy(sim);
+}
+
+static void refuse(const Scene *scene, const char *expected) {
+    Err err = {0};
+    SkiffSim *sim = skiff_create(&scene->def, &err);
+    if (sim != NULL)
+        fail_msg("not refused: %s", expected);
+    assert_int_equal(err.code, ERR_INPUT);
+    if (strstr(err.message, expected) == NULL)
+        fail_msg("expected: %s\nfound:    %s", expected, err.message);
+}
+
+static void test_refusals(void **state) {
+    (void)state;
+    Scene scene;
+    scene_make(&scene);
+    scene.def.params.volume_factor = 0.9f;
+    refuse(&scene, "Configuration.volumeFactor: 0.9, but filling with water at rest needs 0.8");
+    scene_make(&scene);
+    scene.def.tank.geometry.radius = 0.3f;
+    refuse(&scene, "Sea: a window must be at least");
+    scene_make(&scene);
+    scene.def.sea.level = 1.5f;
+    refuse(&scene, "Sea.level: 1.5 m, must lie between the tank's floor");
+    scene_make(&scene);
+    follow_body(&scene);
+    scene.def.sea.follow = "raft";
+    refuse(&scene, "Sea.follow: there is no body 'raft'");
+    scene_make(&scene);
+    follow_body(&scene);
+    scene.body.geometry.translation[0] = 2.0f;
+    refuse(&scene, "Sea.follow: body 'box' starts outside the window");
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_still_water),     cmocka_unit_test(test_every_shape),
+        cmocka_unit_test(test_particles_stay),  cmocka_unit_test(test_path_into_an_obstacle),
+        cmocka_unit_test(test_path_that_jumps), cmocka_unit_test(test_body_outruns_the_window),
+        cmocka_unit_test(test_refusals),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
