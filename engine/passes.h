@@ -1,5 +1,5 @@
-/* The hot loops: everything that visits particle pairs. One text (passes.c) compiled once per instruction
- * set; a table of functions each; all tables give the same bits.
+/* The hot loops: everything that visits particle pairs. One text (passes.c, search.c) compiled once per
+ * instruction set; a table of functions each; all tables give the same bits.
  *
  * Particles are sorted by cell. Sixteen consecutive ones form a slice, 64 slices a block. A block is the unit
  * of scheduling and of summation: whatever thread runs it, it writes its own particles only, and sums over
@@ -233,6 +233,15 @@ typedef struct Passes {
     /* gravity, XSPH viscosity and calming, which conserve momentum exactly */
     void (*forces)(const ForceJob *job, uint32_t block);
 } Passes;
+
+/* Of search.c, for the table. */
+#define PASSES_SEARCH(isa)                                                                                   \
+    int search_##isa(const SearchJob *job, uint32_t block, int thread, Scratch *scratch, uint32_t *fault);   \
+    int boundary_##isa(const BoundaryJob *job, uint32_t block, Scratch *scratch, uint32_t *fault)
+PASSES_SEARCH(plain);
+PASSES_SEARCH(avx2);
+PASSES_SEARCH(avx512);
+#undef PASSES_SEARCH
 
 extern const Passes passes_plain;
 #ifdef SKIFF_HAVE_X86

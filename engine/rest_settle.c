@@ -51,6 +51,7 @@ typedef struct Settle {
     const uint8_t *held;   /* [particles] 1: does not move; or NULL */
     uint32_t active;
     int steps;     /* at most */
+    bool layer;    /* only what is beside solids and existing water: in the cloud */
     bool yields;   /* existing water beside the new moves too */
     bool tracks;   /* where existing water was before the sorts: RestCloud.whence */
     float surface; /* y, m */
@@ -81,6 +82,7 @@ static Settle settle_cloud(SkiffSim *sim) {
     RestCloud *cloud = &sim->rest;
     return (Settle){.sim = sim,
                     .params = sim->params,
+                    .layer = true,
                     .particles = &cloud->points,
                     .grid = &cloud->grid,
                     .rows = &cloud->rows,
@@ -238,7 +240,7 @@ static bool search_all(Settle *settle, uint64_t first_id, Err *err) {
     uint8_t *held = cloud->held.data, *wider = cloud->frozen.data;
     for (uint32_t i = 0; i < particles->count; i++)
         held[i] = particles->id[i] < first_id || particles->edge[i] != EDGE_NONE;
-    if (settle->yields && settle->tracks) {
+    if (settle->tracks && settle->yields) { /* the edge has no rows, and so stays held */
         let_go(settle, held, wider);
         let_go(settle, wider, held);
     }
@@ -341,8 +343,7 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
     SkiffParams *params = &settle->params;
     const double unit = (double)(params->particle_radius / params->time_step);
     const float scale = step_scale(settle);
-    const bool layer = settle->particles == &settle->sim->rest.points;
-    const float errors = layer ? LAYER_ERRORS : 1.0f;
+    const float errors = settle->layer ? LAYER_ERRORS : 1.0f;
     params->max_density_error = errors * params->rest_density_error;
     params->max_divergence_error *= errors;
     params->softening = params->rest_softening;

@@ -87,7 +87,8 @@ static const struct {
     {"\"Configuration\": {\"gravitation\": [0, -9.81, true]}",
      "s.json: Configuration.gravitation[2]: expected a number from -1000 to 1000 m/s^2, found true"},
     {"\"Configuration\": {\"pressureSolver\": \"jakobi\"}",
-     "s.json: Configuration.pressureSolver: expected one of gcr, jacobi, split, found \"jakobi\"; did you mean "
+     "s.json: Configuration.pressureSolver: expected one of gcr, jacobi, split, found \"jakobi\"; did you "
+     "mean "
      "jacobi?"},
     {"\"Configuration\": {\"pressureSolver\": 1}",
      "s.json: Configuration.pressureSolver: expected one of gcr, jacobi, split, found 1"},
