@@ -186,8 +186,9 @@ bool carensac_sheet(CarensacSheet which, Sheet *sheet, Err *err) {
 
 /* ---- Set-ups ---- */
 
-static void begin(CarensacSetup *setup, int block_count) {
+static void begin(CarensacSetup *setup, double radius, int block_count) {
     *setup = (CarensacSetup){.def = skiff_def_default()};
+    setup->def.params.particle_radius = (float)radius;
     setup->def.blocks = setup->blocks;
     setup->def.block_count = block_count;
     for (int b = 0; b < COUNT(setup->blocks); b++)
@@ -209,8 +210,8 @@ static void set_tank(CarensacSetup *setup, float half_x, float half_z, float hei
     tank->wet_height = level + 4 * setup->def.params.particle_radius;
 }
 
-static void set_up_fluid_fluid(CarensacSetup *setup) {
-    begin(setup, 2);
+static void set_up_fluid_fluid(CarensacSetup *setup, double radius) {
+    begin(setup, radius, 2);
     set_tank(setup, 3, 3, 6, 3);
     set_box(setup->blocks[0].start, setup->blocks[0].end, 3, 3, 0, 3);
     set_box(setup->blocks[1].start, setup->blocks[1].end, 2.5f, 2.5f, 0.5f, 3);
@@ -219,16 +220,22 @@ static void set_up_fluid_fluid(CarensacSetup *setup) {
     set_box(setup->removed_min, setup->removed_max, 2.5f, 2.5f, 0.5f, 6);
 }
 
-static void set_up_fluid_boundary(CarensacSetup *setup) {
-    begin(setup, 1);
+static void set_up_fluid_boundary(CarensacSetup *setup, double radius) {
+    begin(setup, radius, 1);
     set_tank(setup, 2.5f, 2.5f, 6, 2.5f);
     set_box(setup->blocks[0].start, setup->blocks[0].end, 2.5f, 2.5f, 0, 2.5f);
 }
 
-/* Half immersed at rest: with the layer of particles around it that water keeps away, a density of 550 does
- * that, not 500. The paper does not give it; it is the authors' scene file's. */
-static void set_up_floating_cube(CarensacSetup *setup) {
-    begin(setup, 1);
+/* Half immersed at rest: water keeps a layer around the cube free, so that a density of 550 does that, not
+ * 500. The paper does not give it; it is the authors' scene file's. With other radii the layer is another. */
+static float cube_density(double radius) {
+    const double edge = 2.0, layer = 1.15; /* m, r */
+    const double swollen = (edge + 2 * layer * radius) / (edge + 2 * layer * CARENSAC_RADIUS);
+    return (float)(550 * swollen * swollen * swollen);
+}
+
+static void set_up_floating_cube(CarensacSetup *setup, double radius) {
+    begin(setup, radius, 1);
     set_tank(setup, 1.75f, 1.75f, 5, 3);
     set_box(setup->blocks[0].start, setup->blocks[0].end, 1.75f, 1.75f, 0, 3);
     setup->body = skiff_body_default();
@@ -238,7 +245,7 @@ static void set_up_floating_cube(CarensacSetup *setup) {
     memcpy(setup->body.geometry.rotation_axis, (float[]){1, 0, 0}, sizeof setup->body.geometry.rotation_axis);
     setup->body.geometry.rotation_angle = 0.78539816f;
     setup->body.geometry.translation[1] = 3;
-    setup->body.density = 550;
+    setup->body.density = cube_density(radius);
     setup->body.free_axes = SKIFF_FREE_ALL;
     setup->def.bodies = &setup->body;
     setup->def.body_count = 1;
@@ -265,9 +272,9 @@ static void write_pyramid(FILE *out) {
                 4 * RINGS + 1);
 }
 
-static bool set_up_pyramid(CarensacSetup *setup, const char *folder, Err *err) {
+static bool set_up_pyramid(CarensacSetup *setup, double radius, const char *folder, Err *err) {
     FileWriter writer;
-    begin(setup, 1);
+    begin(setup, radius, 1);
     snprintf(setup->mesh, sizeof setup->mesh, "%.4000s/pyramid-stack.obj", folder);
     if (!file_begin(&writer, setup->mesh, err))
         return false;
@@ -295,18 +302,18 @@ void carensac_set_paper_method(SkiffParams *params) {
     params->calming = 0.0f;
 }
 
-bool carensac_set_up(int experiment, const char *folder, CarensacSetup *setup, Err *err) {
+bool carensac_set_up(int experiment, double radius, const char *folder, CarensacSetup *setup, Err *err) {
     switch (experiment) {
     case CARENSAC_FLUID_FLUID:
-        set_up_fluid_fluid(setup);
+        set_up_fluid_fluid(setup, radius);
         return true;
     case CARENSAC_FLUID_BOUNDARY:
-        set_up_fluid_boundary(setup);
+        set_up_fluid_boundary(setup, radius);
         return true;
     case CARENSAC_PYRAMID:
-        return set_up_pyramid(setup, folder, err);
+        return set_up_pyramid(setup, radius, folder, err);
     default:
-        set_up_floating_cube(setup);
+        set_up_floating_cube(setup, radius);
         return true;
     }
 }

@@ -108,9 +108,12 @@ enum {
     CARENSAC_FILL_COUNT
 };
 
-/* Set-up of an experiment of table1; fig2 and fig4c use the floating cube. Files it needs are written to
- * `folder`. */
-bool carensac_set_up(int experiment, const char *folder, CarensacSetup *setup, Err *err);
+/* Particle radius of all of the paper's experiments, m. */
+#define CARENSAC_RADIUS 0.025
+
+/* Set-up of an experiment of table1 for particles of `radius` (m); fig2 and fig4c use the floating cube.
+ * Files it needs are written to `folder`. */
+bool carensac_set_up(int experiment, double radius, const char *folder, CarensacSetup *setup, Err *err);
 
 /* Shift of the points of water at rest in a run, from -d to d on each axis, m. */
 void carensac_offset(int run, double radius, double offset[3]);

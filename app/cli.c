@@ -243,10 +243,6 @@ static const Option rest_fill_options[] = {
 };
 
 static const Option reproduce_options[] = {
-    {0, "radius", "R", OPTION_NUMBER, AT(radius), .min = 0.01, .max = 0.08,
-     .help =
-         "Particle radius of fig5 and boat, m (default 0.025, as the paper); larger for a quick look. The "
-         "time step grows with it"},
     {'d', "duration", "S", OPTION_NUMBER, AT(duration), .min = 0.1, .max = 1000,
      .help = "Simulated seconds of fig5 and boat (default 6.6 and 25, of which 5 without thrust)"},
     {0, "runs", "N", OPTION_INTEGER, AT(runs), .min = 1, .max = 10000,
@@ -362,6 +358,7 @@ static const Command commands[] = {
      "itself.\n",
      "  skiff reproduce carensac2023 table1 --runs 5\n"
      "  skiff reproduce carensac2023 fig5 --radius 0.05 -o out/fig5\n"
+     "  skiff reproduce carensac2023 fig4c --radius 0.05 -o float\n"
      "  skiff reproduce carensac2023 all -o out/carensac2023\n",
      reproduce_options, COUNT(reproduce_options), reproduce_carensac_command},
     {"render", "folder of a run", true, "DIR", "Draw a finished run again, or export its particles",

@@ -43,8 +43,8 @@ static void tell(const Reproduction *run, const char *what, const char *row, int
         fprintf(stderr, "%s, %s: %d of %d\n", what, row, done, count);
 }
 
-double reproduce_radius(const CliArgs *args, double standard) {
-    return isnan(args->radius) ? standard : args->radius;
+double reproduce_radius(const CliArgs *args) {
+    return isnan(args->radius) ? CARENSAC_RADIUS : args->radius;
 }
 
 void reproduce_tell(const ReproduceJob *job, const char *row, const SkiffSim *sim, double end) {
@@ -156,7 +156,7 @@ typedef struct Filling {
 
 static bool fill_row(Reproduction *run, Sheet *sheet, int row, const Filling *filling, Err *err) {
     CarensacSetup setup;
-    if (!carensac_set_up(filling->experiment, run->folder, &setup, err))
+    if (!carensac_set_up(filling->experiment, reproduce_radius(run->args), run->folder, &setup, err))
         return false;
     if (filling->method == CARENSAC_PAPER)
         carensac_set_paper_method(&setup.def.params);
@@ -232,7 +232,7 @@ static bool sum_up_floating(Reproduction *run, int row, Err *err) {
 
 static bool float_row(Reproduction *run, int row, Err *err) {
     CarensacSetup setup;
-    if (!carensac_set_up(CARENSAC_FLOATING_CUBE, run->folder, &setup, err))
+    if (!carensac_set_up(CARENSAC_FLOATING_CUBE, reproduce_radius(run->args), run->folder, &setup, err))
         return false;
     if (row == CARENSAC_PAPER)
         carensac_set_paper_method(&setup.def.params);
@@ -344,6 +344,10 @@ static bool write_page(const Reproduction *run, Err *err) {
             ", %d of %d cores, %s, commit <code>%s</code>; the paper's times are of a GPU, an RTX 2070 SUPER"
             "</p>\n",
             run->machine.threads, run->machine.cores, run->machine.isa, run->machine.commit);
+    if (reproduce_radius(run->args) != CARENSAC_RADIUS)
+        fprintf(out,
+                "<p>Particles of radius %g m where the paper has %g m: a quick look, not a comparison.</p>\n",
+                reproduce_radius(run->args), CARENSAC_RADIUS);
     fputs("<p>In fills, rows with the paper's name follow its method: only particles near solids and "
           "existing water "
           "settle, for at most ten steps, and nothing is calmed afterwards either. Rows named "

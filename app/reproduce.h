@@ -17,8 +17,8 @@ typedef struct ReproduceJob {
 
 enum { REPRODUCE_BOAT_WINDOWS = 2 };
 
-/* --radius, or without it the standard one, m. */
-double reproduce_radius(const CliArgs *args, double standard);
+/* --radius, or without it the paper's, m. */
+double reproduce_radius(const CliArgs *args);
 /* A line of progress on stderr, twenty times on the way to `end` (s). */
 void reproduce_tell(const ReproduceJob *job, const char *row, const SkiffSim *sim, double end);
 

@@ -14,7 +14,7 @@
 static const char *const scenes[REPRODUCE_BOAT_WINDOWS] = {"boat-cylinder-5m.json",
                                                            "boat-cylinder-2.5m.json"};
 
-static const double standard_radius = 0.025, standard_step = 0.003, standard_duration = 25;
+static const double standard_step = 0.003, standard_duration = 25;
 static const double start_time = 5; /* s, of the thrust */
 
 /* Columns before those of the phases. The first ones are what profile_make() looks for. */
@@ -36,12 +36,12 @@ static const char header[] =
     "bow_up_deg";
 
 static Scene *load(const ReproduceJob *job, int window, Err *err) {
-    const double radius = reproduce_radius(job->args, standard_radius);
+    const double radius = reproduce_radius(job->args);
     const double duration = isnan(job->args->duration) ? standard_duration : job->args->duration;
     char texts[3][64];
     const char *edits[3];
     snprintf(texts[0], sizeof texts[0], "particleRadius=%.9g", radius);
-    snprintf(texts[1], sizeof texts[1], "timeStepSize=%.9g", standard_step * radius / standard_radius);
+    snprintf(texts[1], sizeof texts[1], "timeStepSize=%.9g", standard_step * radius / CARENSAC_RADIUS);
     snprintf(texts[2], sizeof texts[2], "duration=%.9g", duration);
     for (int k = 0; k < 3; k++)
         edits[k] = texts[k];

@@ -19,25 +19,27 @@ static const char header[] = "t,closed_energy,absorbing_energy,closed_particles,
                              "closed_depth,absorbing_depth";
 static const char *const side_names[SIDE_COUNT] = {"closed end", "absorbing end"};
 
-static const double standard_radius = 0.025, standard_step = 0.003, standard_duration = 6.6;
+static const double standard_step = 0.003, standard_duration = 6.6;
+static const double layer = 0.5; /* m, of the scene */
 /* Between these times (s) the closed half has its least energy, while its first wave stands at the end. The
  * wave is back ("at around 2.1 s") within `reflection_span` of that. */
 static const double turn_from = 1.5, turn_to = 2.2, reflection_span = 0.8;
 static const double end_time = 5.9, end_span = 0.1; /* s; means over the span around the time */
 
 static Scene *load(const ReproduceJob *job, Err *err) {
-    const double radius = reproduce_radius(job->args, standard_radius);
+    const double radius = reproduce_radius(job->args);
     const double duration = isnan(job->args->duration) ? standard_duration : job->args->duration;
-    char texts[4][64];
-    const char *edits[4];
+    char texts[5][64];
+    const char *edits[5];
     snprintf(texts[0], sizeof texts[0], "particleRadius=%.9g", radius);
-    snprintf(texts[1], sizeof texts[1], "timeStepSize=%.9g", standard_step * radius / standard_radius);
+    snprintf(texts[1], sizeof texts[1], "timeStepSize=%.9g", standard_step * radius / CARENSAC_RADIUS);
     snprintf(texts[2], sizeof texts[2], "duration=%.9g", duration);
-    /* the layer that absorbs is five radii thick */
-    snprintf(texts[3], sizeof texts[3], "Sea.absorbMin[2]=%.9g", 5 - 5 * radius);
-    for (int k = 0; k < 4; k++)
+    /* the layer that absorbs keeps its thickness, whatever the particles' size */
+    snprintf(texts[3], sizeof texts[3], "outflowDistance=%.9g", layer / radius);
+    snprintf(texts[4], sizeof texts[4], "inflowLayer=%.9g", layer / radius);
+    for (int k = 0; k < 5; k++)
         edits[k] = texts[k];
-    return carried_scene("wedge.json", edits, 4, err);
+    return carried_scene("wedge.json", edits, 5, err);
 }
 
 static bool add_row(Series *series, const SkiffSim *sim, double *gauges, Err *err) {

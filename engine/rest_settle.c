@@ -25,6 +25,9 @@
 static const double FIRST_ALPHA = 0.8, LAST_ALPHA = 0.1;
 /* Longest step, r / sqrt(p / rho0): beyond 1.5 it is unstable, whatever depth and radius. */
 static const float LONGEST = 1.35f;
+/* The solves stop at 0.4 of a tolerance, so that the error found in the next step keeps it. In a layer that
+ * is let go only after more steps, or as the paper does it, the tolerance itself is enough. */
+static const float LAYER_ERRORS = 2.5f;
 /* Of a density error of held water, the share that a step turns into pressure: with 1 its pressures swing. */
 static const float HELD_SHARE = 0.15f;
 /* Of what two particles lack to the distance of a radius, the share that each moves a step. */
@@ -48,6 +51,7 @@ typedef struct Settle {
     const uint8_t *held;   /* [particles] 1: does not move; or NULL */
     uint32_t active;
     int steps;     /* at most */
+    bool layer;    /* only what is beside solids and existing water: in the cloud */
     bool yields;   /* existing water beside the new moves too */
     bool tracks;   /* where existing water was before the sorts: RestCloud.whence */
     float surface; /* y, m */
@@ -78,6 +82,7 @@ static Settle settle_cloud(SkiffSim *sim) {
     RestCloud *cloud = &sim->rest;
     return (Settle){.sim = sim,
                     .params = sim->params,
+                    .layer = true,
                     .particles = &cloud->points,
                     .grid = &cloud->grid,
                     .rows = &cloud->rows,
@@ -195,14 +200,20 @@ static bool search_cloud(Settle *settle, uint64_t first_id, Err *err) {
     return rest_search(settle->sim, 1u << REST_ACTIVE, err);
 }
 
-/* Does a particle with an id from `first_id` on stand beside i? */
-static bool beside_new(const Settle *settle, uint32_t i, uint64_t first_id) {
+static bool beside_moving(const Settle *settle, const uint8_t *held, uint32_t i) {
     RestNeighbour row[MAX_NEIGHBOURS];
     const int length = rest_row(&settle->rows->pairs, i, row);
     for (int k = 0; k < length; k++)
-        if (settle->particles->id[row[k].index] >= first_id)
+        if (!held[row[k].index])
             return true;
     return false;
+}
+
+/* Lets go what stands beside what moves: wider[i] is held[i] without it. */
+static void let_go(const Settle *settle, const uint8_t *held, uint8_t *wider) {
+#pragma omp parallel for schedule(static, BLOCK) num_threads(settle->sim->threads)
+    for (uint32_t i = 0; i < settle->particles->count; i++)
+        wider[i] = held[i] && !beside_moving(settle, held, i);
 }
 
 static void track_existing(Settle *settle) {
@@ -225,12 +236,13 @@ static bool search_all(Settle *settle, uint64_t first_id, Err *err) {
         return false;
     if (settle->tracks)
         track_existing(settle);
-    uint8_t *held = settle->sim->rest.held.data;
-#pragma omp parallel for schedule(static, BLOCK) num_threads(settle->sim->threads)
-    for (uint32_t i = 0; i < particles->count; i++) {
-        const bool stands =
-            particles->id[i] < first_id && !(settle->yields && beside_new(settle, i, first_id));
-        held[i] = stands || particles->edge[i] != EDGE_NONE;
+    RestCloud *cloud = &settle->sim->rest;
+    uint8_t *held = cloud->held.data, *wider = cloud->frozen.data;
+    for (uint32_t i = 0; i < particles->count; i++)
+        held[i] = particles->id[i] < first_id || particles->edge[i] != EDGE_NONE;
+    if (settle->tracks && settle->yields) { /* the edge has no rows, and so stays held */
+        let_go(settle, held, wider);
+        let_go(settle, wider, held);
     }
     return true;
 }
@@ -279,15 +291,6 @@ static bool search_column(Settle *settle, uint64_t first_id, Err *err) {
     return search_all(settle, first_id, err);
 }
 
-static bool beside_moving(const Settle *settle, uint32_t i) {
-    RestNeighbour row[MAX_NEIGHBOURS];
-    const int length = rest_row(&settle->rows->pairs, i, row);
-    for (int k = 0; k < length; k++)
-        if (!settle->held[row[k].index])
-            return true;
-    return false;
-}
-
 /* What is held beside the new water: where it is too dense it presses more, and less where it is too thin, so
  * that the new water comes to rest where both are at rest. */
 static void correct_held(Settle *settle) {
@@ -296,7 +299,7 @@ static void correct_held(Settle *settle) {
 #pragma omp parallel for schedule(static, BLOCK) num_threads(settle->sim->threads)
     for (uint32_t i = 0; i < particles->count; i++) {
         const bool has_row = settle->frozen == NULL || !settle->frozen[i];
-        if (!settle->held[i] || !has_row || !beside_moving(settle, i))
+        if (!settle->held[i] || !has_row || !beside_moving(settle, settle->held, i))
             continue;
         const float diagonal = fmaxf(pairs->gradient_sum[i][3], 1.0f);
         const float next = particles->pressure[i] + HELD_SHARE * (pairs->density[i] - 1.0f) / diagonal;
@@ -340,7 +343,9 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
     SkiffParams *params = &settle->params;
     const double unit = (double)(params->particle_radius / params->time_step);
     const float scale = step_scale(settle);
-    params->max_density_error = params->rest_density_error;
+    const float errors = settle->layer ? LAYER_ERRORS : 1.0f;
+    params->max_density_error = errors * params->rest_density_error;
+    params->max_divergence_error *= errors;
     params->softening = params->rest_softening;
     params->feedforward = 0.0f;
     params->time_step *= scale;
@@ -488,7 +493,8 @@ static bool settle_water(SkiffSim *sim, float surface, uint64_t first_id, SkiffF
     if (fill->active == 0)
         return true;
     still_existing(sim);
-    if (!buffer_reserve(&sim->rest.held, "held particles", sim->particles.capacity + SLICE, err))
+    if (!buffer_reserve(&sim->rest.held, "held particles", sim->particles.capacity + SLICE, err) ||
+        !buffer_reserve(&sim->rest.frozen, "held particles", sim->particles.capacity + SLICE, err))
         return false;
     const bool nothing_else = fill->active == sim->particles.count;
     memset(sim->rest.held.data, 0, sim->particles.capacity + SLICE);
@@ -601,9 +607,10 @@ void rest_cloud_free(RestCloud *cloud) {
     cloud->boundary.fixed = cloud->boundary.moving = (BoundarySet){0};
     boundary_free(&cloud->boundary);
     dfsph_free(&cloud->dfsph);
-    Buffer *buffers[] = {&cloud->marks,   &cloud->laid,  &cloud->source,    &cloud->fate,     &cloud->frozen,
-                         &cloud->held,    &cloud->state, &cloud->constant,  &cloud->walls,    &cloud->sum,
-                         &cloud->density, &cloud->order, &cloud->whence[0], &cloud->whence[1]};
+    Buffer *buffers[] = {&cloud->marks,    &cloud->clearance, &cloud->laid,     &cloud->source,
+                         &cloud->fate,     &cloud->frozen,    &cloud->held,     &cloud->state,
+                         &cloud->constant, &cloud->walls,     &cloud->sum,      &cloud->density,
+                         &cloud->order,    &cloud->whence[0], &cloud->whence[1]};
     for (size_t b = 0; b < sizeof buffers / sizeof *buffers; b++)
         buffer_free(buffers[b]);
     for (int f = 0; f <= PARTICLE_FIELD_COUNT; f++)

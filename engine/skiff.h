@@ -48,6 +48,8 @@ typedef struct SkiffDriveDef {
 #undef PARAM_ENUM
 
 /* Values of the enums of drive.inl, in the order of their names. */
+/* The same of params.inl. */
+enum { SKIFF_SOLVER_GCR, SKIFF_SOLVER_JACOBI, SKIFF_SOLVER_SPLIT };
 enum { SKIFF_THRUST_AT_CENTRE, SKIFF_THRUST_AT_PROPELLER };
 enum { SKIFF_STEERING_TORQUE, SKIFF_STEERING_RUDDER };
 enum { SKIFF_HOLD_PROPORTIONAL, SKIFF_HOLD_BANGBANG };
@@ -368,7 +370,7 @@ typedef struct SkiffStats {
     double time, dt; /* s, at the end of the step */
     uint32_t particles, boundary_samples, contacts;
     uint32_t particles_in[SKIFF_IN_COUNT], particles_out[SKIFF_OUT_COUNT]; /* during the step, by cause */
-    bool moved; /* the window moved in this step */
+    bool moved;                                                            /* the window moved in this step */
     int density_iterations, divergence_iterations;
     double density_error_percent; /* mean over all particles of max(0, rho/rho0 - 1), found at the start of
                                      the step: what the last one left */

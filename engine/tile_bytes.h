@@ -1,4 +1,5 @@
-/* The files assets/rest/tile.skiff and surface.skiff, turned into arrays when the engine is built (CMakeLists.txt). */
+/* The files assets/rest/tile.skiff and surface.skiff, turned into arrays when the engine is built
+ * (CMakeLists.txt). */
 #ifndef SKIFF_TILE_BYTES_H
 #define SKIFF_TILE_BYTES_H
 

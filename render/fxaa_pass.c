@@ -88,13 +88,13 @@ static void smooth_pixel(const Picture *picture, const float at[2], const float 
         out[k] = (uint8_t)(result[k] + 0.5f);
 }
 
-/* Where the luminance changes by much: 1, else 0. Each row has one more pixel at both ends. */
+/* Where the luminance changes by much: 1, else 0. Neighbours at the corners do not count, so that a bright
+ * drop stays a dot. Each row has one more pixel at both ends. */
 static void find_edges(const float *restrict below, const float *restrict here, const float *restrict above,
                        int width, uint8_t *restrict edge) {
     for (int x = 0; x < width; x++) {
-        float low =
-            least(here[x], least(least(below[x - 1], below[x + 1]), least(above[x - 1], above[x + 1])));
-        float high = most(here[x], most(most(below[x - 1], below[x + 1]), most(above[x - 1], above[x + 1])));
+        float low = least(here[x], least(least(below[x], above[x]), least(here[x - 1], here[x + 1])));
+        float high = most(here[x], most(most(below[x], above[x]), most(here[x - 1], here[x + 1])));
         edge[x] = high - low >= most(CONTRAST_LEAST, CONTRAST_PART * high);
     }
 }

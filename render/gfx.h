@@ -158,8 +158,9 @@ typedef struct GfxOcean {
     float edge_min[2], edge_max[2]; /* x and z, local, m */
     float blend[2]; /* m, 0 <= [0] < [1]: particles count for nothing nearer to the edge than [0], alone
                        beyond [1] */
-    /* White water on the ocean where particles have left it, sampled as the distances are; NULL: none. Sum of
-     * GfxParticles.foam over the particles at the surface, per square of a spacing; 0 beyond the bounds. */
+    /* White water on the sea, inside the window and where particles have left it, sampled as the distances
+     * are; NULL: none. Sum of GfxParticles.foam over the particles at the surface, per square of a spacing; 0
+     * beyond the bounds. Only sheets and crests high above still water show the particles' own foam. */
     const float *foam;
     uint32_t foam_size[2];          /* 2..4096 each */
     float foam_min[2], foam_max[2]; /* x and z, local, m */

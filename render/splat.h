@@ -42,8 +42,8 @@ static inline int splat_stride(int width) {
 }
 
 /* Draws all discs into the rows [from, to) of an image, whose first one the arrays begin with: the nearest
- * depth, and the disc's number where `disc` is not NULL. */
-void splat_rows(const Splat *splat, int width, int from, int to, float *depth, uint32_t *disc);
+ * depth, and the number of the disc that it belongs to where `owner` is not NULL. */
+void splat_rows(const Splat *splat, int width, int from, int to, float *depth, uint32_t *owner);
 
 /* The pixels [*first, *end) of row `y` that the disc touches; false: none. */
 bool splat_span(const SplatDisc *disc, int width, int y, int *first, int *end);

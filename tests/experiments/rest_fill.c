@@ -14,7 +14,7 @@
 enum { FREE_STEPS = 100, BODY = 1, WATER = 2 };
 
 static const float WIDTH = 60.0f, DEPTH = 24.0f, BODY_EDGE = 20.0f; /* r */
-static const float BODY_DENSITY = 700.0f;
+static const float BODY_DENSITY = 675.0f;
 
 typedef struct TankKind {
     const char *name;

@@ -3,12 +3,12 @@
  * back from the walls of the tank (shallow water: sqrt(g h), to the side and back about 3.6 s). */
 #include "experiment.h"
 
-enum { CELLS = 25, HALF = CELLS / 2 }; /* cells of the map of the surface, to a side */
+enum { CELLS = 15, HALF = CELLS / 2 }; /* cells of the map of the surface, to a side */
 
 static const double radius_default = 0.05, level = 0.9, window_radius = 2.5; /* m */
 static const double speed = 1.4, ramp = 1.0;                                 /* m/s, s */
 static const double from = 2.0, surface_from = 3.0, to = 3.6;                /* s */
-static const double cell = 0.16;                                             /* m */
+static const double cell = 0.25;                                             /* m */
 
 typedef struct Twin {
     double drag;                 /* mean, N, against the motion */
@@ -56,6 +56,8 @@ static void add_heights(const SkiffSim *sim, double (*height)[CELLS]) {
     const SkiffParticles particles = skiff_particles(sim);
     const double share = experiment_particle_volume(sim) / (cell * cell);
     for (uint32_t i = 0; i < particles.count; i++) {
+        if ((double)particles.position[i][1] + particles.origin[1] < 0.0)
+            continue; /* below the floor: of the water at rest that stands around a moving window */
         const double x = (double)particles.position[i][0] + particles.origin[0] - hull.position[0];
         const double z = (double)particles.position[i][2] + particles.origin[2] - hull.position[2];
         const int column = (int)floor(x / cell + 0.5) + HALF, row = (int)floor(z / cell + 0.5) + HALF;

@@ -5,6 +5,7 @@
 #include "render/tables.h"
 
 #include <math.h>
+#include <omp.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -316,6 +317,51 @@ static void colors_grow_lighter(void **state) {
     }
 }
 
+/* Odd sizes, eyes above, beside and in the water, both looks, with and without an ocean: the picture is that
+ * of one thread. */
+static void number_of_threads_does_not_matter(void **state) {
+    (void)state;
+    static const int sizes[][3] = {{16, 16, 1}, {17, 19, 1}, {83, 31, 2}};
+    static const float eyes[][3] = {{0.5f, 3.0f, 0.6f}, {-0.3f, 0.05f, 0.5f}, {0.5f, -0.2f, 0.5f}};
+    static uint8_t one[83 * 31 * 3], three[83 * 31 * 3];
+    static const float inside[4] = {9.0f, 9.0f, 9.0f, 9.0f};
+    GfxScene scene = make_block();
+    scene.ocean.edge_distance = inside;
+    for (int k = 0; k < 2; k++) {
+        scene.ocean.edge_min[k] = -5.0f;
+        scene.ocean.edge_max[k] = 5.0f;
+    }
+    for (int i = 0; i < COUNT; i++)
+        fade[i] = i % 5 == 0 ? 0.5f : 1.0f;
+    int threads = omp_get_max_threads();
+    for (int i = 0; i < 3 * 2; i++) {
+        const int *size = sizes[i / 2];
+        Err err = {0};
+        GfxDef def = gfx_def_default();
+        def.width = size[0];
+        def.height = size[1];
+        def.supersample = size[2];
+        def.look = i % 2 ? GFX_LOOK_WATER : GFX_LOOK_PARTICLES;
+        Gfx *gfx = gfx_create(&def, &err);
+        if (!gfx) {
+            assert_int_equal(err.code, ERR_GL);
+            skip();
+        }
+        for (int k = 0; k < 3 * 2; k++) {
+            scene.ocean.enabled = k % 2;
+            memcpy(scene.camera.eye, eyes[k / 2], sizeof scene.camera.eye);
+            memcpy(scene.camera.target, (float[3]){0.6f, -0.1f, 0.4f}, sizeof scene.camera.target);
+            omp_set_num_threads(1);
+            assert_true(gfx_draw(gfx, &scene, one, &err));
+            omp_set_num_threads(3);
+            assert_true(gfx_draw(gfx, &scene, three, &err));
+            omp_set_num_threads(threads);
+            assert_memory_equal(one, three, (size_t)size[0] * (size_t)size[1] * 3);
+        }
+        gfx_destroy(gfx);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(only_upper_layers_of_an_ocean_are_drawn),
@@ -329,6 +375,7 @@ int main(void) {
         cmocka_unit_test(bad_scenes_are_refused_and_do_no_harm),
         cmocka_unit_test(bad_meshes_are_refused),
         cmocka_unit_test(colors_grow_lighter),
+        cmocka_unit_test(number_of_threads_does_not_matter),
     };
     return cmocka_run_group_tests_name("render", tests, NULL, NULL);
 }

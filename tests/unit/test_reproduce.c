@@ -233,7 +233,7 @@ static void set_ups_have_the_paper_s_sizes(void **state) {
         CarensacSetup setup;
         Err err = {0};
         float min[3], max[3];
-        assert_true(carensac_set_up(row, folder, &setup, &err));
+        assert_true(carensac_set_up(row, CARENSAC_RADIUS, folder, &setup, &err));
         assert_float_equal(shape_volume(&setup.def.tank.geometry, min, max), expected[row].tank, 1e-3);
         assert_float_equal(min[1], 0, 1e-6);
         assert_float_equal(max[1], expected[row].top, 1e-5);
@@ -249,7 +249,7 @@ static void the_cube_floats_half_immersed_on_an_edge(void **state) {
     (void)state;
     CarensacSetup setup;
     float min[3], max[3];
-    assert_true(carensac_set_up(CARENSAC_FLOATING_CUBE, folder, &setup, NULL));
+    assert_true(carensac_set_up(CARENSAC_FLOATING_CUBE, CARENSAC_RADIUS, folder, &setup, NULL));
     assert_float_equal(shape_volume(&setup.body.geometry, min, max), 8, 1e-4);
     assert_float_equal(min[1], 3 - sqrt(2), 1e-4);
     assert_float_equal(max[1], 3 + sqrt(2), 1e-4);
@@ -273,7 +273,7 @@ static void the_wedge_parts_the_corridor(void **state) {
     assert_float_equal(max[0], 1, 1e-3);
     assert_true(wedge->density == 800 && wedge->stop_time == 0.72);
     assert_float_equal(shape_volume(&scene->def.tank.geometry, min, max), 50, 1e-3);
-    assert_true(scene->def.sea.has_region && scene->def.sea.region_min[2] == 4.875f);
+    assert_true(scene->def.sea.has_region && scene->def.sea.region_min[2] == 4.5f);
     scene_free(scene);
 }
 

@@ -163,7 +163,7 @@ static void check_existing(const Motion *before, const Motion *after, uint64_t e
         moved++;
         assert_int_equal(settle, REST_SETTLE_SHELL);
         /* the cut is at x = -0.2 above y = 0.15 */
-        assert_true(a[0] > -0.2f - 5.0f * r && (a[0] < -0.2f + 5.0f * r || a[1] < 0.15f + 5.0f * r));
+        assert_true(a[0] > -0.2f - 9.0f * r && (a[0] < -0.2f + 5.0f * r || a[1] < 0.15f + 5.0f * r));
         for (int k = 0; k < 3; k++)
             assert_true(fabsf(b[k] - a[k]) < r);
     }
