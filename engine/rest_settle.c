@@ -25,9 +25,10 @@
 static const double FIRST_ALPHA = 0.8, LAST_ALPHA = 0.1;
 /* Longest step, r / sqrt(p / rho0): beyond 1.5 it is unstable, whatever depth and radius. */
 static const float LONGEST = 1.35f;
-/* The solves stop at 0.4 of a tolerance, so that the error found in the next step keeps it. In a layer that
- * is let go only after more steps, or as the paper does it, the tolerance itself is enough. */
-static const float LAYER_ERRORS = 2.5f;
+/* The solves of moving water stop at 0.6 of a tolerance. In a layer that is let go only after more steps, or
+ * as the paper does it, the tolerance itself is enough; whatever the last steps leave moves the first free
+ * ones. */
+static const float LAYER_ERRORS = 1.6f, LAST_ERRORS = 0.5f;
 /* Of a density error of held water, the share that a step turns into pressure: with 1 its pressures swing. */
 static const float HELD_SHARE = 0.15f;
 /* Of what two particles lack to the distance of a radius, the share that each moves a step. */
@@ -343,7 +344,7 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
     SkiffParams *params = &settle->params;
     const double unit = (double)(params->particle_radius / params->time_step);
     const float scale = step_scale(settle);
-    const float errors = settle->layer ? LAYER_ERRORS : 1.0f;
+    const float errors = settle->layer ? LAYER_ERRORS : LAST_ERRORS;
     params->max_density_error = errors * params->rest_density_error;
     params->max_divergence_error *= errors;
     params->softening = params->rest_softening;
