@@ -1,12 +1,12 @@
 /* The boat of [Carensac2023] sec. 5.7 in its window of 5 m under 5000 N, driven by the input files that come
- * with the program: straight ahead, a slalom, stop and go. Twice the paper's particles by default; in
- * larger ones still the boat planes and runs away. */
+ * with the program: straight ahead, a slalom, stop and go. Coarse particles by default; the paper's size is
+ * --radius 0.025. */
 #include "experiment.h"
 
 #include "app/pilot.h"
 
 static const char *const scene_file = SKIFF_SOURCE_DIR "/assets/scenes/boat-cylinder-5m.json";
-static const double radius_default = 0.05;
+static const double radius_default = 0.1;
 static const double cruise_from = 10.0, cruise_to = 40.0; /* s; thrust begins at 5 s */
 
 typedef struct Course {
