@@ -20,7 +20,7 @@ static const char header[] = "t,closed_energy,absorbing_energy,closed_particles,
 static const char *const side_names[SIDE_COUNT] = {"closed end", "absorbing end"};
 
 static const double standard_step = 0.003, standard_duration = 6.6;
-static const double layer = 0.5; /* m, of the scene */
+static const double outflow_layer = 0.5, inflow_layer = 0.125; /* m, of the scene */
 /* Between these times (s) the closed half has its least energy, while its first wave stands at the end. The
  * wave is back ("at around 2.1 s") within `reflection_span` of that. */
 static const double turn_from = 1.5, turn_to = 2.2, reflection_span = 0.8;
@@ -34,9 +34,9 @@ static Scene *load(const ReproduceJob *job, Err *err) {
     snprintf(texts[0], sizeof texts[0], "particleRadius=%.9g", radius);
     snprintf(texts[1], sizeof texts[1], "timeStepSize=%.9g", standard_step * radius / CARENSAC_RADIUS);
     snprintf(texts[2], sizeof texts[2], "duration=%.9g", duration);
-    /* the layer that absorbs keeps its thickness, whatever the particles' size */
-    snprintf(texts[3], sizeof texts[3], "outflowDistance=%.9g", layer / radius);
-    snprintf(texts[4], sizeof texts[4], "inflowLayer=%.9g", layer / radius);
+    /* the layers keep their thickness, whatever the particles' size */
+    snprintf(texts[3], sizeof texts[3], "outflowDistance=%.9g", outflow_layer / radius);
+    snprintf(texts[4], sizeof texts[4], "inflowLayer=%.9g", inflow_layer / radius);
     for (int k = 0; k < 5; k++)
         edits[k] = texts[k];
     return carried_scene("wedge.json", edits, 5, err);

@@ -129,7 +129,8 @@ static void stop_and_go(Experiment *experiment) {
             again = fmax(again, speed);
     }
     experiment_within(experiment, "stop and go: fastest before the stop", fastest, 2.0, 4.0, "m/s");
-    experiment_within(experiment, "stop and go: slowest, astern until 15 s", stopped, -2.0, 0.3, "m/s");
+    /* two seconds full astern stop it and more */
+    experiment_limit(experiment, "stop and go: slowest, astern until 15 s", stopped, 0.3, "m/s");
     experiment_within(experiment, "stop and go: fastest after it", again, 1.5, 4.0, "m/s");
     end(&course);
 }

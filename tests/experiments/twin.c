@@ -5,7 +5,7 @@
 
 enum { CELLS = 15, HALF = CELLS / 2 }; /* cells of the map of the surface, to a side */
 
-static const double radius_default = 0.05, level = 0.9, window_radius = 2.5; /* m */
+static const double radius_default = 0.06, level = 0.9, window_radius = 2.5; /* m */
 static const double speed = 1.4, ramp = 1.0;                                 /* m/s, s */
 static const double from = 2.0, surface_from = 3.0, to = 3.6;                /* s */
 static const double cell = 0.25;                                             /* m */
