@@ -33,14 +33,23 @@ static const float MIN_DIAGONAL = 1e-6f;
 /* The divergence solve leaves out particles with fewer neighbours: spray has no divergence to speak of. */
 enum { MIN_NEIGHBOURS = 20 };
 /* The two-sided residual goes this far below the one-sided tolerance, so that the usual error, measured at
- * the next step, keeps it. In still water what is left over stays where it is, and forces on the floor
- * flicker with it; in a flow that moves a fiftieth of the spacing a step, the motion's curved part is most of
- * the error anyway. */
+ * the next step, keeps it. `motion` is that of the water in spacings a step. In a flow the motion's curved
+ * part is most of the error anyway. In still water what is left over stays where it is, and forces on the
+ * floor flicker with it; in water stiller than a settled tank a column would breathe within the tolerance,
+ * and there it costs one iteration to say no. */
 static double safety(double motion) {
-    static const double STILL = 0.4, FLOWING = 0.6, STILL_MOTION = 0.002, FLOWING_MOTION = 0.02;
-    const double share = (motion - STILL_MOTION) / (FLOWING_MOTION - STILL_MOTION);
-    return STILL + (FLOWING - STILL) * (share < 0.0 ? 0.0 : share > 1.0 ? 1.0 : share);
+    static const double knots[][2] = {{0.0008, 0.15}, {0.0014, 0.4}, {0.002, 0.4}, {0.02, 0.6}};
+    enum { COUNT = sizeof knots / sizeof knots[0] };
+    for (int k = 1; k < COUNT; k++)
+        if (motion < knots[k][0]) {
+            const double share = (motion - knots[k - 1][0]) / (knots[k][0] - knots[k - 1][0]);
+            return knots[k - 1][1] + (knots[k][1] - knots[k - 1][1]) * (share > 0.0 ? share : 0.0);
+        }
+    return knots[COUNT - 1][1];
 }
+
+/* Of the solves that only prepare another. */
+static const double STEADY_SAFETY = 0.4;
 
 bool dfsph_reserve(Dfsph *dfsph, uint32_t particle_capacity, uint32_t object_count, Err *err) {
     const size_t padded = particle_capacity + BLOCK, blocks = padded / BLOCK;
@@ -347,15 +356,20 @@ static void prepare(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, f
     }
 }
 
-/* Root mean square of the velocities, in particle spacings a step. */
+/* Root mean square of the velocities without this step's gravity, in particle spacings a step. */
 static double water_motion(const Dfsph *dfsph, const DfsphProblem *problem) {
     const uint32_t blocks = particles_blocks(problem->particles);
+    const uint32_t count = problem->particles->count;
     const Float4 *velocity = (const Float4 *)problem->particles->velocity;
+    const float dt = problem->params->time_step, *gravity = problem->params->gravity;
     EACH_BLOCK {
-        double sum = 0.0; /* the padding of the last block is 0 */
-        for (uint32_t i = block * BLOCK; i < (block + 1) * BLOCK; i++)
-            sum += (double)(velocity[i][0] * velocity[i][0] + velocity[i][1] * velocity[i][1] +
-                            velocity[i][2] * velocity[i][2]);
+        double sum = 0.0;
+        const uint32_t end = (block + 1) * BLOCK < count ? (block + 1) * BLOCK : count;
+        for (uint32_t i = block * BLOCK; i < end; i++)
+            for (int k = 0; k < 3; k++) {
+                const float v = velocity[i][k] - dt * gravity[k];
+                sum += (double)(v * v);
+            }
         dfsph->partials[block * DFSPH_SUMS] = sum;
     }
     double total;
@@ -505,13 +519,13 @@ static SolveLimits solve_limits(const Dfsph *dfsph, const DfsphProblem *problem,
     const double density = (double)params->max_density_error / 100.0;
     switch (kind) {
     case SOLVE_DIVERGENCE:
-        return (SolveLimits){(double)params->max_divergence_error / 100.0, safety(0.0),
+        return (SolveLimits){(double)params->max_divergence_error / 100.0, STEADY_SAFETY,
                              params->min_divergence_iterations, params->max_divergence_iterations};
     case SOLVE_FLOW:
-        return (SolveLimits){FLOW_TOLERANCE * density, safety(0.0), params->min_iterations,
+        return (SolveLimits){FLOW_TOLERANCE * density, STEADY_SAFETY, params->min_iterations,
                              params->max_iterations};
     case SOLVE_SHIFT:
-        return (SolveLimits){density, safety(0.0), params->min_iterations, params->max_iterations};
+        return (SolveLimits){density, STEADY_SAFETY, params->min_iterations, params->max_iterations};
     default:
         return (SolveLimits){density, safety(water_motion(dfsph, problem)), params->min_iterations,
                              params->max_iterations};
