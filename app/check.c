@@ -31,7 +31,9 @@ static void print_summary(const Scene *scene, const SkiffSim *sim) {
         later += scene->def.blocks[i].time > scene->def.start_time ? scene->def.blocks[i].repeat
                                                                    : scene->def.blocks[i].repeat - 1;
     fprintf(stderr, "%s: ok\n", scene->file);
-    fprintf(stderr, "  particles         %u\n", skiff_particles(sim).count);
+    const uint32_t particles = skiff_particles(sim).count;
+    fprintf(stderr, "  particles         %u%s\n", particles,
+            particles == 0 && later == 0 ? ": the scene has no fluid" : "");
     if (later > 0)
         fprintf(stderr, "  emitted later     %d blocks\n", later);
     fprintf(stderr, "  boundary samples  %u\n", summary_sample_count(sim));

@@ -10,8 +10,11 @@
  * chosen. KMP_BLOCKTIME is LLVM's name for it. */
 static void limit_spinning(char **argv) {
     static const char *const settings[][2] = {{"GOMP_SPINCOUNT", "1000"}, {"KMP_BLOCKTIME", "0"}};
-    if (getenv("OMP_WAIT_POLICY") != NULL)
-        return;
+    /* Bound threads stay bound through exec: all of them would share the first one's core. */
+    static const char *const chosen[] = {"OMP_WAIT_POLICY", "OMP_PROC_BIND", "GOMP_CPU_AFFINITY"};
+    for (size_t k = 0; k < sizeof chosen / sizeof chosen[0]; k++)
+        if (getenv(chosen[k]) != NULL)
+            return;
     for (size_t k = 0; k < sizeof settings / sizeof settings[0]; k++)
         if (getenv(settings[k][0]) != NULL)
             return;

@@ -280,7 +280,8 @@ typedef struct RuleCurve {
 
 static void write_fig2_chart(FILE *out, const Sheet *sheet, const char *title, const char *x_label,
                              const char *y_label, int x_column, int y_column) {
-    static const char *const names[] = {"base", "regulator", "regulator+protection"};
+    /* the base rule, which some charts lack, comes last: a rule has the same colour in all of them */
+    static const char *const names[] = {"regulator", "regulator+protection", "base"};
     RuleCurve data[3];
     SvgCurve curves[3];
     for (int c = 0; c < 3; c++)
@@ -289,14 +290,13 @@ static void write_fig2_chart(FILE *out, const Sheet *sheet, const char *title, c
         const CarensacVariant variant = carensac_variant(row);
         if (x_column < 0 && variant.rule == CARENSAC_BASE)
             continue; /* has no R */
-        const size_t at = curves[variant.rule].count++;
-        data[variant.rule].x[at] =
-            x_column < 0 ? variant.parameter : sheet_figure(sheet, row, x_column).median;
-        data[variant.rule].y[at] = sheet_figure(sheet, row, y_column).median;
+        const int curve = ((int)variant.rule + 2) % 3;
+        const size_t at = curves[curve].count++;
+        data[curve].x[at] = x_column < 0 ? variant.parameter : sheet_figure(sheet, row, x_column).median;
+        data[curve].y[at] = sheet_figure(sheet, row, y_column).median;
     }
     const SvgChart labels = {.title = title, .x_label = x_label, .y_label = y_label};
-    const int first = x_column < 0 ? 1 : 0;
-    svg_curves(out, &labels, curves + first, 3 - first);
+    svg_curves(out, &labels, curves, x_column < 0 ? 2 : 3);
 }
 
 static void write_fig2_charts(FILE *out, const Sheet *sheet) {

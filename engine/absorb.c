@@ -122,33 +122,50 @@ static bool body_is_near(const SkiffSim *sim, const float p[3], float distance) 
     return false;
 }
 
-/* Is there room at inlet `index`? flow: the velocity of what would come in; [3] 1 if it does. */
+/* Particles [begin, end) of run 0 to 8 of the cells around cell c: three cells of a column each, the column
+ * of the cell itself first. */
+static void cell_run(const CellGrid *grid, const int32_t c[3], int run, uint32_t *begin, uint32_t *end) {
+    const int column = (run + 4) % 9;
+    const int32_t x = c[0] + column / 3 - 1, z = c[2] + column % 3 - 1;
+    const int32_t low = c[1] - 1 < 0 ? 0 : c[1] - 1;
+    const int32_t high = c[1] + 1 >= grid->size[1] ? grid->size[1] - 1 : c[1] + 1;
+    *begin = *end = 0;
+    if (x < 0 || z < 0 || x >= grid->size[0] || z >= grid->size[2] || low > high)
+        return;
+    *begin = grid->start[cell_grid_index(grid, x, low, z)];
+    *end = grid->start[cell_grid_index(grid, x, high, z) + 1];
+}
+
+static float distance_sq(const float p[3], const float q[3]) {
+    const float dx = p[0] - q[0], dy = p[1] - q[1], dz = p[2] - q[2];
+    return dx * dx + dy * dy + dz * dz;
+}
+
+/* Is there room at inlet `index`? flow: the velocity of what would come in; [3] 1 if it does. Nearly always
+ * somebody is there, and is found at once. */
 static void try_inlet(const SkiffSim *sim, uint32_t index, float flow[4]) {
     const Sea *sea = &sim->sea;
     const CellGrid *grid = &sim->grid.cells;
+    const Float4 *position = sim->particles.position;
     const float *p = sea->inlets[index];
     const float distance = sim->params.inflow_distance * sim->params.particle_radius;
     int32_t c[3];
+    uint32_t begin, end;
     double weight_sum = 0.0, sum[3] = {0};
     flow[3] = 0.0f;
     for (int k = 0; k < 3; k++)
         c[k] = (int32_t)floorf((p[k] - grid->origin[k]) * grid->inv_size);
     for (int run = 0; run < 9; run++) {
-        const int32_t x = c[0] + run / 3 - 1, z = c[2] + run % 3 - 1;
-        if (x < 0 || z < 0 || x >= grid->size[0] || z >= grid->size[2])
-            continue;
-        const int32_t low = c[1] - 1 < 0 ? 0 : c[1] - 1;
-        const int32_t high = c[1] + 1 >= grid->size[1] ? grid->size[1] - 1 : c[1] + 1;
-        if (low > high)
-            continue;
-        const uint32_t end = grid->start[cell_grid_index(grid, x, high, z) + 1];
-        for (uint32_t j = grid->start[cell_grid_index(grid, x, low, z)]; j < end; j++) {
-            const float *q = sim->particles.position[j];
-            const float dx = p[0] - q[0], dy = p[1] - q[1], dz = p[2] - q[2];
-            const float r_sq = dx * dx + dy * dy + dz * dz;
-            if (r_sq < distance * distance)
+        cell_run(grid, c, run, &begin, &end);
+        for (uint32_t j = begin; j < end; j++)
+            if (distance_sq(p, position[j]) < distance * distance)
                 return;
-            const double weight = (double)(sim->volume * kernel_w(&sim->kernel, sqrtf(r_sq)));
+    }
+    for (int run = 0; run < 9; run++) {
+        cell_run(grid, c, run, &begin, &end);
+        for (uint32_t j = begin; j < end; j++) {
+            const double weight =
+                (double)(sim->volume * kernel_w(&sim->kernel, sqrtf(distance_sq(p, position[j]))));
             weight_sum += weight;
             for (int k = 0; k < 3; k++)
                 sum[k] += weight * (double)sim->particles.velocity[j][k];

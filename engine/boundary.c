@@ -387,7 +387,8 @@ bool boundary_apply(Boundary *boundary, Rows *rows, const RowsJob *build, Err *e
                              .kernel = rows->pairs.kernel,
                              .density = rows->density.data,
                              .gradient_sum = rows->gradient_sum.data,
-                             .neighbours = rows->neighbours};
+                             .neighbours = rows->neighbours,
+                             .shape = {rows->shape[0].data, rows->shape[1].data}};
     uint32_t fault;
     if (!apply_blocks(boundary, &job, build->passes, rows, build->threads, &fault))
         return err_set(err, ERR_DIVERGED, "particle %llu touches more than %d walls and bodies at once",

@@ -13,11 +13,19 @@
  * through the density and once through the velocity, and every step has to work it off again. Divergence
  * solve: the same with dt D v alone.
  *
+ * Split: water at rest that is solved so is a glass. Every density is a constraint of its own, a smooth flow
+ * through disordered particles breaks them all a little, and what mends them works against the pressure: a
+ * slow vortex stops and turns back. So velocities get the pressure by gradients that are right for linear
+ * fields, on which a smooth flow without divergence does no work, and the densities are mended by moving the
+ * particles without their velocities (the same solve with the density's own gradients; where there is
+ * pressure it may pull as well as push). Bodies do not answer the second.
+ *
  * gcr: conjugate residuals (GCR with one direction kept) preconditioned by the diagonal, on the set where P >
  * 0 or the residual is positive, projected to P >= 0 after each step. jacobi: relaxed Jacobi as in the
  * papers, compression only. Both count applications of A. */
 #include "dfsph.h"
 
+#include <float.h>
 #include <math.h>
 
 /* Diagonals below this belong to particles without a neighbour to push. */
@@ -36,7 +44,7 @@ static double safety(double motion) {
 
 bool dfsph_reserve(Dfsph *dfsph, uint32_t particle_capacity, uint32_t object_count, Err *err) {
     const size_t padded = particle_capacity + BLOCK, blocks = padded / BLOCK;
-    const size_t bytes = padded * (5 * sizeof(Float4) + 7 * sizeof(float)) +
+    const size_t bytes = padded * (5 * sizeof(Float4) + 8 * sizeof(float)) +
                          blocks * DFSPH_SUMS * sizeof(double) + (size_t)object_count * 12 * sizeof(double);
     if (!buffer_reserve(&dfsph->buffer, "pressure solver", bytes, err))
         return false;
@@ -59,6 +67,7 @@ bool dfsph_reserve(Dfsph *dfsph, uint32_t particle_capacity, uint32_t object_cou
     TAKE(new_image, padded);
     TAKE(inv_diagonal, padded);
     TAKE(source, padded);
+    TAKE(lower, padded);
 #undef TAKE
     return true;
 }
@@ -122,7 +131,7 @@ static void set_operand(Dfsph *dfsph, const DfsphProblem *problem, const float *
 static void apply_transpose(Dfsph *dfsph, const DfsphProblem *problem, const float *p, const Float4 *base,
                             float scale, Float4 *result) {
     const uint32_t blocks = particles_blocks(problem->particles);
-    const PairData *pairs = &problem->rows->pairs;
+    const PairData *pairs = dfsph->pairs;
     const AccelerateJob job = {
         .operand = (const Float4 *)dfsph->operand, .base = base, .scale = scale, .result = result};
     EACH_BLOCK {
@@ -130,7 +139,7 @@ static void apply_transpose(Dfsph *dfsph, const DfsphProblem *problem, const flo
         if (problem->held != NULL)
             hold_block(problem->held, pairs, &job, block);
     }
-    if (!dfsph->moving)
+    if (!dfsph->moving || !dfsph->answering)
         return;
     boundary_impulse(problem->boundary, p, blocks, dfsph->impulses, problem->threads);
     const double mass = (double)pairs->volume * (double)problem->params->rest_density;
@@ -163,7 +172,7 @@ static void subtract_bodies(const Boundary *boundary, const double (*velocities)
 
 static void divergence_block(const Dfsph *dfsph, const DfsphProblem *problem, const Float4 *v,
                              const double (*velocities)[6], float *result, uint32_t block) {
-    problem->passes->divergence(&problem->rows->pairs, v, result, block);
+    problem->passes->divergence(dfsph->pairs, v, result, block);
     if (dfsph->moving)
         subtract_bodies(problem->boundary, velocities, result, block);
 }
@@ -207,20 +216,21 @@ typedef struct Errors {
     double one_sided, two_sided;
 } Errors;
 
-static inline void error_lanes(const float *residual, const float *p, LaneSum *one, LaneSum *two) {
+static inline void error_lanes(const float *residual, const float *p, const float *lower, LaneSum *one,
+                               LaneSum *two) {
     EACH_LANE {
         const float positive = residual[l] > 0.0f ? residual[l] : 0.0f;
-        const float negative = residual[l] < 0.0f && p[l] > 0.0f ? -residual[l] : 0.0f;
+        const float negative = residual[l] < 0.0f && p[l] > lower[l] ? -residual[l] : 0.0f;
         one->lane[l] += positive;
         two->lane[l] += positive + negative;
     }
 }
 
 /* z, also as the operand of the next application. */
-static inline void precondition_lanes(const float *residual, const float *p, const float *inv_diagonal,
-                                      float *z, Float4 *operand) {
+static inline void precondition_lanes(const float *residual, const float *p, const float *lower,
+                                      const float *inv_diagonal, float *z, Float4 *operand) {
     EACH_LANE {
-        z[l] = p[l] > 0.0f || residual[l] > 0.0f ? residual[l] * inv_diagonal[l] : 0.0f;
+        z[l] = p[l] > lower[l] || residual[l] > 0.0f ? residual[l] * inv_diagonal[l] : 0.0f;
         operand[l][3] = z[l];
     }
 }
@@ -244,8 +254,9 @@ static Errors evaluate_residual(Dfsph *dfsph, const DfsphProblem *problem, const
                 const float r = dfsph->source[i] + dt * residual[i];
                 residual[i] = dfsph->inv_diagonal[i] > 0.0f ? r : 0.0f;
             }
-            error_lanes(residual + first, p + first, &one, &two);
-            precondition_lanes(residual + first, p + first, dfsph->inv_diagonal + first,
+            const float *lower = dfsph->lower + first;
+            error_lanes(residual + first, p + first, lower, &one, &two);
+            precondition_lanes(residual + first, p + first, lower, dfsph->inv_diagonal + first,
                                dfsph->preconditioned + first, dfsph->operand + first);
         }
         dfsph->partials[block * DFSPH_SUMS] = lane_total(&one);
@@ -272,7 +283,7 @@ static float density_source(const SkiffParams *params, float density, float pred
      * repeat */
     const float least = 0.02f * params->particle_radius / params->time_step;
     const bool moves = v[0] * v[0] + v[1] * v[1] + v[2] * v[2] > least * least;
-    if (moves && prediction > 0.0f && density > DENSE && params->pressure_solver == 0)
+    if (moves && prediction > 0.0f && density > DENSE && params->pressure_solver != SKIFF_SOLVER_JACOBI)
         expected = params->feedforward * (density - prediction);
     expected = expected > LARGEST ? LARGEST : expected < -LARGEST ? -LARGEST : expected;
     const float patience = prediction < 0.0f ? 1.0f + prediction : 1.0f;
@@ -298,14 +309,28 @@ static void predict_density(const Dfsph *dfsph, const DfsphProblem *problem) {
     }
 }
 
-/* Inverse diagonal, 0 where a particle takes no part; source; pressure scaled to the warm start. */
+/* What stands beside dt D v. Divergence and flow: where there is room to the rest density, approaching is no
+ * fault: thin water falls together freely. */
+static float source_of(const DfsphProblem *problem, SolveKind kind, uint32_t i) {
+    const float density = problem->rows->pairs.density[i];
+    if (kind == SOLVE_DENSITY || kind == SOLVE_SHIFT)
+        return density_source(problem->params, density, problem->particles->prediction[i],
+                              problem->particles->velocity[i]);
+    return density < 1.0f ? density - 1.0f : 0.0f;
+}
+
+/* Share of the last solution to start from. */
+static float warm_start(const SkiffParams *params, SolveKind kind) {
+    return kind == SOLVE_DIVERGENCE ? params->warm_start_divergence : params->warm_start;
+}
+
+/* Inverse diagonal, 0 where a particle takes no part; source; bounds; pressure scaled to the warm start. */
 static void prepare(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, float *p) {
     const uint32_t blocks = particles_blocks(problem->particles);
     const uint32_t count = problem->particles->count;
-    const float warm =
-        kind == SOLVE_DENSITY ? problem->params->warm_start : problem->params->warm_start_divergence;
-    const Float4 *gradient_sum = problem->rows->pairs.gradient_sum;
-    const float *density = problem->rows->pairs.density;
+    const float warm = warm_start(problem->params, kind);
+    const Float4 *gradient_sum = dfsph->pairs->gradient_sum;
+    const float *pressure = problem->particles->pressure;
     EACH_BLOCK {
         for (uint32_t i = block * BLOCK; i < (block + 1) * BLOCK; i++) {
             const bool few = kind == SOLVE_DIVERGENCE && problem->rows->neighbours[i] < MIN_NEIGHBOURS;
@@ -314,15 +339,10 @@ static void prepare(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, f
             dfsph->direction[i] = dfsph->image[i] = 0.0f; /* other arrays may have lain here */
             memcpy(dfsph->operand[i], problem->particles->position[i], sizeof(Float4));
             dfsph->inv_diagonal[i] = takes_part ? 1.0f / gradient_sum[i][3] : 0.0f;
+            dfsph->lower[i] = kind == SOLVE_SHIFT && pressure[i] > 0.0f ? -FLT_MAX : 0.0f;
             if (!held)
-                p[i] = takes_part && p[i] > 0.0f ? warm * p[i] : 0.0f;
-            /* divergence: where there is room to the rest density, approaching is no fault: thin water falls
-             * together freely */
-            dfsph->source[i] = kind == SOLVE_DENSITY ? density_source(problem->params, density[i],
-                                                                      problem->particles->prediction[i],
-                                                                      problem->particles->velocity[i])
-                               : density[i] < 1.0f   ? density[i] - 1.0f
-                                                     : 0.0f;
+                p[i] = takes_part && p[i] > dfsph->lower[i] ? warm * p[i] : 0.0f;
+            dfsph->source[i] = source_of(problem, kind, i);
         }
     }
 }
@@ -363,8 +383,9 @@ static GcrSums gcr_apply(Dfsph *dfsph, const DfsphProblem *problem, const float 
             const float *r = dfsph->residual + first, *q = dfsph->image + first,
                         *w = dfsph->new_image + first;
             const float *inv = dfsph->inv_diagonal + first, *pressure = p + first;
+            const float *lower = dfsph->lower + first;
             EACH_LANE {
-                const float weight = pressure[l] > 0.0f || r[l] > 0.0f ? inv[l] : 0.0f;
+                const float weight = pressure[l] > lower[l] || r[l] > 0.0f ? inv[l] : 0.0f;
                 const float wq = weight * q[l], ww = weight * w[l];
                 sums[0].lane[l] += wq * w[l];
                 sums[1].lane[l] += ww * w[l];
@@ -392,6 +413,7 @@ static double gcr_update(Dfsph *dfsph, const DfsphProblem *problem, float *p, fl
             float *r = dfsph->residual + first, *q = dfsph->image + first, *d = dfsph->direction + first;
             float *z = dfsph->preconditioned + first, *pressure = p + first;
             const float *w = dfsph->new_image + first, *inv = dfsph->inv_diagonal + first;
+            const float *lower = dfsph->lower + first;
             EACH_LANE {
                 d[l] = z[l] - beta * d[l];
                 q[l] = w[l] - beta * q[l];
@@ -399,16 +421,16 @@ static double gcr_update(Dfsph *dfsph, const DfsphProblem *problem, float *p, fl
                  * come back by it; and what P >= 0 does not allow has not changed the particle's own
                  * residual either. Two drops that barely touch went apart at 200 m/s without this: their
                  * diagonal is tiny and their steps are huge. */
-                const bool active = pressure[l] > 0.0f || r[l] > 0.0f;
+                const bool active = pressure[l] > lower[l] || r[l] > 0.0f;
                 const float step = alpha * d[l], next = pressure[l] + step;
-                const float lost = !active ? step : next < 0.0f ? next : 0.0f;
+                const float lost = !active ? step : next < lower[l] ? next - lower[l] : 0.0f;
                 const float correction = inv[l] > 0.0f ? lost / inv[l] : 0.0f;
                 cut.lane[l] += fabsf(correction);
-                pressure[l] = active && next > 0.0f ? next : 0.0f;
+                pressure[l] = active && next > lower[l] ? next : lower[l];
                 r[l] = inv[l] > 0.0f ? r[l] - alpha * q[l] + correction : 0.0f;
             }
-            error_lanes(r, pressure, &one, &two);
-            precondition_lanes(r, pressure, inv, z, dfsph->operand + first);
+            error_lanes(r, pressure, lower, &one, &two);
+            precondition_lanes(r, pressure, lower, inv, z, dfsph->operand + first);
         }
         dfsph->partials[block * DFSPH_SUMS] = lane_total(&one);
         dfsph->partials[block * DFSPH_SUMS + 1] = lane_total(&two);
@@ -476,31 +498,59 @@ static SolveResult solve_jacobi(Dfsph *dfsph, const DfsphProblem *problem, float
 
 /* ---- The solve ---- */
 
-SolveResult dfsph_solve(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind) {
+static SolveLimits solve_limits(const Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind) {
+    /* what the flow leaves, the shift mends in the same step */
+    static const double FLOW_TOLERANCE = 2.0;
     const SkiffParams *params = problem->params;
+    const double density = (double)params->max_density_error / 100.0;
+    switch (kind) {
+    case SOLVE_DIVERGENCE:
+        return (SolveLimits){(double)params->max_divergence_error / 100.0, safety(0.0),
+                             params->min_divergence_iterations, params->max_divergence_iterations};
+    case SOLVE_FLOW:
+        return (SolveLimits){FLOW_TOLERANCE * density, safety(0.0), params->min_iterations,
+                             params->max_iterations};
+    case SOLVE_SHIFT:
+        return (SolveLimits){density, safety(0.0), params->min_iterations, params->max_iterations};
+    default:
+        return (SolveLimits){density, safety(water_motion(dfsph, problem)), params->min_iterations,
+                             params->max_iterations};
+    }
+}
+
+/* Bodies that are to follow what was found, and no longer answer. */
+static void change_bodies(const Dfsph *dfsph, const DfsphProblem *problem) {
+    const double scale = 1.0 / (double)problem->params->time_step;
+    for (int b = 0; b < problem->body_count; b++)
+        for (int k = 0; k < 3; k++) {
+            problem->bodies[b].velocity[k] -= scale * dfsph->responses[1 + b][k];
+            problem->bodies[b].angular_velocity[k] -= scale * dfsph->responses[1 + b][3 + k];
+        }
+}
+
+SolveResult dfsph_solve(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind) {
     if (problem->evaluated_count == 0)
         return (SolveResult){0};
-    float *p = kind == SOLVE_DENSITY ? problem->particles->pressure : problem->particles->pressure_divergence;
-    const SolveLimits limits =
-        kind == SOLVE_DENSITY
-            ? (SolveLimits){(double)params->max_density_error / 100.0, safety(water_motion(dfsph, problem)),
-                            params->min_iterations, params->max_iterations}
-            : (SolveLimits){(double)params->max_divergence_error / 100.0, safety(0.0),
-                            params->min_divergence_iterations, params->max_divergence_iterations};
+    const bool first = kind == SOLVE_DENSITY || kind == SOLVE_FLOW;
+    float *p = first ? problem->particles->pressure : problem->particles->pressure_divergence;
+    dfsph->pairs = kind == SOLVE_FLOW ? &problem->rows->corrected : &problem->rows->pairs;
     dfsph->moving = problem->body_count > 0 && problem->boundary->moving.samples.count != 0;
+    dfsph->answering = kind != SOLVE_SHIFT;
+    if (dfsph->moving)
+        memset(dfsph->responses, 0, (1 + (size_t)problem->body_count) * sizeof *dfsph->responses);
     prepare(dfsph, problem, kind, p);
-    const SolveResult result = params->pressure_solver == 0 ? solve_gcr(dfsph, problem, p, limits)
-                                                            : solve_jacobi(dfsph, problem, p, limits);
-    if (kind == SOLVE_DENSITY)
+    const SolveLimits limits = solve_limits(dfsph, problem, kind);
+    const SolveResult result = problem->params->pressure_solver == SKIFF_SOLVER_JACOBI
+                                   ? solve_jacobi(dfsph, problem, p, limits)
+                                   : solve_gcr(dfsph, problem, p, limits);
+    if (kind == SOLVE_DENSITY || kind == SOLVE_SHIFT)
         predict_density(dfsph, problem);
-    change_velocities(dfsph, problem, p);
-    if (dfsph->moving) {
-        const double scale = 1.0 / (double)params->time_step;
-        for (int b = 0; b < problem->body_count; b++)
-            for (int k = 0; k < 3; k++) {
-                problem->bodies[b].velocity[k] -= scale * dfsph->responses[1 + b][k];
-                problem->bodies[b].angular_velocity[k] -= scale * dfsph->responses[1 + b][3 + k];
-            }
+    if (kind == SOLVE_SHIFT) {
+        apply_pressure(dfsph, problem, p, dfsph->guess);
+        return result;
     }
+    change_velocities(dfsph, problem, p);
+    if (dfsph->moving)
+        change_bodies(dfsph, problem);
     return result;
 }

@@ -5,7 +5,14 @@
 
 #include "boundary.h"
 
-typedef enum SolveKind { SOLVE_DIVERGENCE, SOLVE_DENSITY } SolveKind;
+typedef enum SolveKind {
+    SOLVE_DIVERGENCE,
+    SOLVE_DENSITY,
+    /* the two of pressureSolver split, in this order */
+    SOLVE_FLOW, /* velocities, by corrected gradients; particles->pressure */
+    SOLVE_SHIFT /* positions, by the density's own; particles->pressure_divergence. The velocities stay; guess
+                   is what to move with */
+} SolveKind;
 
 typedef struct SolveResult {
     int iterations;  /* applications of the operator, the one for the warm start included */
@@ -23,7 +30,10 @@ typedef struct Dfsph {
     double *partials;       /* [blocks][DFSPH_SUMS] */
     double (*impulses)[6];  /* [objects] sums of boundary_impulse */
     double (*responses)[6]; /* [objects] a body's answer: (D^T p) of its six velocities */
+    float *lower;           /* least value of the unknown */
     bool moving;            /* any object has a velocity or may get one */
+    bool answering;         /* and bodies answer pressure */
+    const PairData *pairs;  /* whose gradients the solve at hand is made with */
     Buffer buffer;
 } Dfsph;
 

@@ -11,7 +11,8 @@
 
 /* Caught water goes on for a while, so that the water behind it need not stop at once; s. */
 static const float CATCH_TIME = 0.05f;
-/* By as much of its share pressures at rest may differ from that of still water: three times their spread. */
+/* Pressures at rest differ from that of still water by less than this share of it, three times their spread,
+ * and what a radius of depth makes: the surface's particles do not lie at the level. */
 static const float SHARE = 0.25f;
 /* Where the edge ends rounding decides who belongs to it: the same particle is closer than this, r. */
 static const float SAME = 0.5f;
@@ -72,9 +73,12 @@ static float still_pressure(const SkiffSim *sim, const float p[3]) {
  * what still water has. */
 static void catch_particle(SkiffSim *sim, uint32_t i) {
     Particles *particles = &sim->particles;
-    const float still = still_pressure(sim, particles->position[i]);
+    const float *p = particles->position[i];
+    const float still = still_pressure(sim, p);
+    const float deeper =
+        still_pressure(sim, (const float[3]){p[0], p[1] - sim->params.particle_radius, p[2]});
     particles->edge[i] = EDGE_CAUGHT;
-    if (!(fabsf(particles->pressure[i] - still) < SHARE * still))
+    if (!(fabsf(particles->pressure[i] - still) < SHARE * still + (deeper - still)))
         particles->pressure[i] = still;
     particles->pressure_divergence[i] = 0.0f;
 }
@@ -161,7 +165,8 @@ static bool sort_rim(SkiffSim *sim, EdgePlace *place, Err *err) {
     memset(start, 0, (cells + 2) * sizeof(uint32_t));
     for (uint32_t i = 0; i < particles->count; i++) {
         const float *p = particles->position[i];
-        if (distance_before(place, p) < place->support - RIM * place->radius)
+        if (particles->edge[i] == EDGE_NONE ||
+            distance_before(place, p) < place->support - RIM * place->radius)
             continue;
         start[grid_cell_of(grid, p) + 2]++;
         found[count++] = i;

@@ -15,7 +15,7 @@ PARAM_FLOAT(viscosity, "viscosity", 0.02f, 0.0f, 1.0f, "", "XSPH viscosity: shar
 PARAM_FLOAT(calming, "calming", 1.0f, 0.0f, 1.0f, "", "Share of the disorderly part of the velocity (what no linear field around a particle explains) removed a step: stills water at rest and leaves waves alone")
 PARAM_FLOAT(calming_limit, "calmingLimit", 1.0f, 0.0f, 1e3f, "m/s^2", "Calming never brakes harder than this: splashes are spared")
 PARAM_FLOAT(wall_friction, "wallFriction", 0.0f, 0.0f, 1.0f, "", "The same towards walls and bodies; 0 is free slip, as the papers")
-PARAM_ENUM(pressure_solver, "pressureSolver", 0, "gcr|jacobi", "gcr: projected conjugate residuals; jacobi: relaxed Jacobi, as the papers")
+PARAM_ENUM(pressure_solver, "pressureSolver", 0, "gcr|jacobi|split", "gcr: projected conjugate residuals; jacobi: relaxed Jacobi, as the papers; split: as gcr, but pressure acts by gradients that are right for linear fields, and what these leave of the density is corrected in the positions alone: still water flows like water")
 PARAM_FLOAT(softening, "densitySoftening", 0.25f, 0.01f, 1.0f, "", "Share of a density error that one step corrects; 1 as the papers")
 PARAM_FLOAT(feedforward, "densityFeedforward", 1.0f, 0.0f, 1.0f, "", "gcr: share of the last step's error of prediction that the density solve expects again; 0 as the papers")
 PARAM_FLOAT(warm_start, "warmStart", 1.0f, 0.0f, 1.0f, "", "Share of the last pressures that the density solve starts from; the papers' codes use 1 or 0.5")

@@ -1,5 +1,5 @@
-/* The hot loops: everything that visits particle pairs. One text (passes.c) compiled once per instruction
- * set; a table of functions each; all tables give the same bits.
+/* The hot loops: everything that visits particle pairs. One text (passes.c, search.c) compiled once per
+ * instruction set; a table of functions each; all tables give the same bits.
  *
  * Particles are sorted by cell. Sixteen consecutive ones form a slice, 64 slices a block. A block is the unit
  * of scheduling and of summation: whatever thread runs it, it writes its own particles only, and sums over
@@ -110,6 +110,8 @@ typedef struct PairData {
     const Float4 *position;
     const float *density;       /* rho / rho0 */
     const Float4 *gradient_sum; /* G_i = sum_j V grad W_ij + g_i; [3]: diagonal of D D^T */
+    const int16_t *gradients;   /* NULL, or [entries][3][SLICE] corrected gradients in place of the factors */
+    float gradient_unit;        /* value of 1 in gradients, 1/m */
 } PairData;
 
 /* The particle in lane `lane` of an entry of the slice that begins at `first`. */
@@ -161,7 +163,19 @@ typedef struct BoundaryJob {
     float *density;       /* NULL: list the contacts only */
     Float4 *gradient_sum; /* in: as the search left it; out: with the boundary, [3] the diagonal */
     uint16_t *neighbours;
+    Float4 *shape[2]; /* NULL, or out: moments of the walls, see CorrectionJob */
 } BoundaryJob;
+
+/* Gradients that are right for linear fields, made in two passes over the rows [Bonet & Lok 1999, kept
+ * antisymmetric]: B_i = [sum_j -V grad W_ij (x_i - x_j)^T, samples of walls and bodies included]^-1, then
+ * (B_i + B_j) / 2 V grad W_ij. What walls and bodies push with stays as it is. */
+typedef struct CorrectionJob {
+    const PairData *pairs;
+    Float4 *shape[2];   /* in: moments of the walls (xx, yy, zz), (xy, xz, yz); `shape` turns them to B */
+    int16_t *gradients; /* out of `correct`: as in PairData */
+    float gradient_unit;
+    Float4 *gradient_sum; /* out of `correct` */
+} CorrectionJob;
 
 /* Vectors that `divergence` takes carry their moment about PairData.centre in the fourth place: with it a
  * pair needs one gather, sum_j f (x_i - x_j) . v_j = x_i . sum_j f v_j - sum_j f x_j . v_j. The difference
@@ -212,11 +226,22 @@ typedef struct Passes {
     /* result_i = (D v)_i = v_i . G_i - sum_j v_j . V grad W_ij, v with moments; contacts with moving bodies
      * are the caller's */
     void (*divergence)(const PairData *pairs, const Float4 *v, float *result, uint32_t block);
+    void (*shape)(const CorrectionJob *job, uint32_t block);
+    void (*correct)(const CorrectionJob *job, uint32_t block);
     /* velocity gradients by weighted least squares over the neighbours */
     void (*strain)(const StrainJob *job, uint32_t block);
     /* gravity, XSPH viscosity and calming, which conserve momentum exactly */
     void (*forces)(const ForceJob *job, uint32_t block);
 } Passes;
+
+/* Of search.c, for the table. */
+#define PASSES_SEARCH(isa)                                                                                   \
+    int search_##isa(const SearchJob *job, uint32_t block, int thread, Scratch *scratch, uint32_t *fault);   \
+    int boundary_##isa(const BoundaryJob *job, uint32_t block, Scratch *scratch, uint32_t *fault)
+PASSES_SEARCH(plain);
+PASSES_SEARCH(avx2);
+PASSES_SEARCH(avx512);
+#undef PASSES_SEARCH
 
 extern const Passes passes_plain;
 #ifdef SKIFF_HAVE_X86

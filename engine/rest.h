@@ -65,9 +65,10 @@ typedef struct RestCloud {
     Boundary boundary; /* the simulation's samples with contacts of the cloud's own */
     Dfsph dfsph;
     bool fits_walls;     /* the points fit the walls: these make no candidates and remove nothing */
+    bool has_existing;   /* existing water is among the points */
     float counted_below; /* y: candidates above lack neighbours and do not count in the mean density */
-    Buffer marks, laid, source, fate; /* rest_gather.c */
-    Buffer frozen, held;              /* [points] 1: gets no row; gets one but does not move */
+    Buffer marks, clearance, laid, source, fate; /* rest_gather.c */
+    Buffer frozen, held;                         /* [points] 1: gets no row; gets one but does not move */
     Buffer state, constant, walls, sum, density, order; /* rest_select.c */
     Buffer kept[PARTICLE_FIELD_COUNT + 1];              /* existing water as it was, and its densities */
     Buffer whence[2];                                   /* where existing water stands in `kept` */

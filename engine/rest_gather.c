@@ -11,15 +11,15 @@
 /* Fate of a point: for the cloud the RestKind plus IN_CLOUD. */
 enum { DROPPED, BULK, IN_CLOUD };
 
-/* Marks of a cell: a solid or existing water is in it, in one beside it, in one beside that; whether walls
- * and bodies leave it alone. */
-enum { TOUCHED = 1, NEAR = 2, AROUND = 4, ALL_CLEAR = 8, ALL_SOLID = 16 };
+/* Marks of a cell: a solid or existing water is in it, in one beside it, in one beside that. */
+enum { TOUCHED = 1, NEAR = 2, AROUND = 4 };
 
 typedef struct Gather {
     SkiffSim *sim;
     const RestRequest *request;
     CellGrid cells;
     uint8_t *marks;
+    float *clearance; /* of the cells' centres, m */
     size_t cell_count;
 } Gather;
 
@@ -93,22 +93,41 @@ static void dilate(Gather *gather, uint8_t from, uint8_t to) {
             }
 }
 
-/* One distance for a whole cell where that settles the matter: most are far from any wall. */
-static void mark_clearance(Gather *gather) {
+static void cell_centre(const CellGrid *cells, int32_t x, int32_t y, int32_t z, float centre[3]) {
+    const int32_t c[3] = {x, y, z};
+    for (int k = 0; k < 3; k++)
+        centre[k] = cells->origin[k] + ((float)c[k] + 0.5f) / cells->inv_size;
+}
+
+/* One distance a cell settles the matter for most of its points: a distance changes no faster than one moves.
+ */
+static void measure_cells(Gather *gather) {
     const CellGrid *cells = &gather->cells;
-    const float edge = 1.0f / cells->inv_size, reach = 0.5f * sqrtf(3.0f) * edge;
-    const float least = least_clearance(gather->sim);
 #pragma omp parallel for schedule(dynamic, 1) num_threads(gather->sim->threads)
     for (int32_t x = 0; x < cells->size[0]; x++)
         for (int32_t z = 0; z < cells->size[2]; z++)
             for (int32_t y = 0; y < cells->size[1]; y++) {
-                const float centre[3] = {cells->origin[0] + edge * ((float)x + 0.5f),
-                                         cells->origin[1] + edge * ((float)y + 0.5f),
-                                         cells->origin[2] + edge * ((float)z + 0.5f)};
-                const float clearance = rest_clearance(gather->sim, centre, gather->request->fitted == NULL);
-                uint8_t *mark = &gather->marks[cell_grid_index(cells, x, y, z)];
-                *mark |= clearance - reach > least ? ALL_CLEAR : clearance + reach < least ? ALL_SOLID : 0;
+                float centre[3];
+                cell_centre(cells, x, y, z, centre);
+                gather->clearance[cell_grid_index(cells, x, y, z)] =
+                    rest_clearance(gather->sim, centre, gather->request->fitted == NULL);
             }
+}
+
+/* Is p, in the cell, clear of walls and bodies? */
+static bool is_clear(const Gather *gather, size_t cell, const float p[3]) {
+    const CellGrid *cells = &gather->cells;
+    const int32_t column = (int32_t)cell / cells->size[1];
+    float centre[3], apart_sq = 0.0f;
+    cell_centre(cells, column / cells->size[2], (int32_t)cell % cells->size[1], column % cells->size[2],
+                centre);
+    for (int k = 0; k < 3; k++)
+        apart_sq += (p[k] - centre[k]) * (p[k] - centre[k]);
+    const float clearance = gather->clearance[cell], apart = 1.001f * sqrtf(apart_sq);
+    const float least = least_clearance(gather->sim);
+    if (clearance - apart > least || clearance + apart < least)
+        return clearance > least;
+    return rest_clearance(gather->sim, p, gather->request->fitted == NULL) >= least;
 }
 
 static bool make_cells(Gather *gather, Err *err) {
@@ -124,8 +143,10 @@ static bool make_cells(Gather *gather, Err *err) {
                        (double)support);
     gather->cell_count =
         (size_t)gather->cells.size[0] * (size_t)gather->cells.size[1] * (size_t)gather->cells.size[2];
-    if (!buffer_reserve(&sim->rest.marks, "cells to fill", gather->cell_count, err))
+    if (!buffer_reserve(&sim->rest.marks, "cells to fill", gather->cell_count, err) ||
+        !buffer_reserve(&sim->rest.clearance, "clearance of cells", gather->cell_count * sizeof(float), err))
         return false;
+    gather->clearance = sim->rest.clearance.data;
     gather->marks = sim->rest.marks.data;
     memset(gather->marks, 0, gather->cell_count);
     if (gather->request->fitted == NULL && sim->boundary.fixed.samples.count > 0)
@@ -137,7 +158,7 @@ static bool make_cells(Gather *gather, Err *err) {
     dilate(gather, TOUCHED, NEAR);
     dilate(gather, NEAR, AROUND);
     /* fitted water keeps clear of the walls, and bodies are found by their samples' densities */
-    mark_clearance(gather);
+    measure_cells(gather);
     return true;
 }
 
@@ -148,13 +169,10 @@ static uint8_t fate_of(const Gather *gather, const float p[3]) {
     if (!cell_of(&gather->cells, p, &cell))
         return DROPPED;
     const uint8_t mark = gather->marks[cell];
-    if (mark & ALL_SOLID)
-        return DROPPED;
     const RestPlace place = gather->request->place(gather->request->user, p);
     if (place == REST_OUTSIDE || (place == REST_IN_AIR && !(mark & AROUND)))
         return DROPPED;
-    if (!(mark & ALL_CLEAR) &&
-        rest_clearance(gather->sim, p, gather->request->fitted == NULL) < least_clearance(gather->sim))
+    if (!is_clear(gather, cell, p))
         return DROPPED;
     if (place == REST_IN_AIR)
         return IN_CLOUD + (mark & NEAR ? REST_AIR : REST_SUPPORT_AIR);
@@ -280,7 +298,8 @@ bool rest_gather(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err
         if (fate[i] >= IN_CLOUD)
             append(&gather, &cloud->points, i, rest_id((RestKind)(fate[i] - IN_CLOUD), cloud->points.count),
                    0.0);
-    if (near > 0 && sim->particles.count > 0)
+    cloud->has_existing = near > 0 && sim->particles.count > 0;
+    if (cloud->has_existing)
         add_existing(&gather);
     for (uint32_t i = 0; i < laid; i++)
         if (fate[i] == BULK)

@@ -80,7 +80,7 @@ static void find_candidates(Select *select) {
             continue;
         RestNeighbour row[MAX_NEIGHBOURS];
         int32_t existing = 0, closest = 0;
-        const int length = rest_row(select->pairs, i, row);
+        const int length = select->cloud->has_existing ? rest_row(select->pairs, i, row) : 0;
         for (int k = 0; k < length; k++) {
             if (kind_of(select, row[k].index) != REST_EXISTING)
                 continue;

@@ -25,9 +25,10 @@
 static const double FIRST_ALPHA = 0.8, LAST_ALPHA = 0.1;
 /* Longest step, r / sqrt(p / rho0): beyond 1.5 it is unstable, whatever depth and radius. */
 static const float LONGEST = 1.35f;
-/* The solves stop at 0.4 of a tolerance, so that the error found in the next step keeps it. In a layer that
- * is let go only after more steps, or as the paper does it, the tolerance itself is enough. */
-static const float LAYER_ERRORS = 2.5f;
+/* The solves of moving water stop at 0.6 of a tolerance. In a layer that is let go only after more steps, or
+ * as the paper does it, the tolerance itself is enough; whatever the last steps leave moves the first free
+ * ones. */
+static const float LAYER_ERRORS = 1.6f, LAST_ERRORS = 0.5f;
 /* Of a density error of held water, the share that a step turns into pressure: with 1 its pressures swing. */
 static const float HELD_SHARE = 0.15f;
 /* Of what two particles lack to the distance of a radius, the share that each moves a step. */
@@ -51,6 +52,7 @@ typedef struct Settle {
     const uint8_t *held;   /* [particles] 1: does not move; or NULL */
     uint32_t active;
     int steps;     /* at most */
+    bool layer;    /* only what is beside solids and existing water: in the cloud */
     bool yields;   /* existing water beside the new moves too */
     bool tracks;   /* where existing water was before the sorts: RestCloud.whence */
     float surface; /* y, m */
@@ -81,6 +83,7 @@ static Settle settle_cloud(SkiffSim *sim) {
     RestCloud *cloud = &sim->rest;
     return (Settle){.sim = sim,
                     .params = sim->params,
+                    .layer = true,
                     .particles = &cloud->points,
                     .grid = &cloud->grid,
                     .rows = &cloud->rows,
@@ -238,7 +241,7 @@ static bool search_all(Settle *settle, uint64_t first_id, Err *err) {
     uint8_t *held = cloud->held.data, *wider = cloud->frozen.data;
     for (uint32_t i = 0; i < particles->count; i++)
         held[i] = particles->id[i] < first_id || particles->edge[i] != EDGE_NONE;
-    if (settle->yields && settle->tracks) {
+    if (settle->tracks && settle->yields) { /* the edge has no rows, and so stays held */
         let_go(settle, held, wider);
         let_go(settle, wider, held);
     }
@@ -341,8 +344,7 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
     SkiffParams *params = &settle->params;
     const double unit = (double)(params->particle_radius / params->time_step);
     const float scale = step_scale(settle);
-    const bool layer = settle->particles == &settle->sim->rest.points;
-    const float errors = layer ? LAYER_ERRORS : 1.0f;
+    const float errors = settle->layer ? LAYER_ERRORS : LAST_ERRORS;
     params->max_density_error = errors * params->rest_density_error;
     params->max_divergence_error *= errors;
     params->softening = params->rest_softening;
@@ -606,9 +608,10 @@ void rest_cloud_free(RestCloud *cloud) {
     cloud->boundary.fixed = cloud->boundary.moving = (BoundarySet){0};
     boundary_free(&cloud->boundary);
     dfsph_free(&cloud->dfsph);
-    Buffer *buffers[] = {&cloud->marks,   &cloud->laid,  &cloud->source,    &cloud->fate,     &cloud->frozen,
-                         &cloud->held,    &cloud->state, &cloud->constant,  &cloud->walls,    &cloud->sum,
-                         &cloud->density, &cloud->order, &cloud->whence[0], &cloud->whence[1]};
+    Buffer *buffers[] = {&cloud->marks,    &cloud->clearance, &cloud->laid,     &cloud->source,
+                         &cloud->fate,     &cloud->frozen,    &cloud->held,     &cloud->state,
+                         &cloud->constant, &cloud->walls,     &cloud->sum,      &cloud->density,
+                         &cloud->order,    &cloud->whence[0], &cloud->whence[1]};
     for (size_t b = 0; b < sizeof buffers / sizeof *buffers; b++)
         buffer_free(buffers[b]);
     for (int f = 0; f <= PARTICLE_FIELD_COUNT; f++)

@@ -120,7 +120,44 @@ bool rows_build(Rows *rows, const RowsJob *build, Err *err) {
     }
 }
 
+bool rows_reserve_correction(Rows *rows, const Particles *particles, Err *err) {
+    const size_t bytes = (particles->capacity + SLICE) * sizeof(Float4);
+    const size_t gradients = (size_t)rows->pool_entries * 3 * SLICE * sizeof(int16_t);
+    return buffer_reserve(&rows->gradients, "corrected gradients", gradients, err) &&
+           buffer_reserve(&rows->corrected_sum, "corrected gradient sums", bytes, err) &&
+           buffer_reserve(&rows->shape[0], "gradient corrections", bytes, err) &&
+           buffer_reserve(&rows->shape[1], "gradient corrections", bytes, err);
+}
+
+void rows_correct(Rows *rows, const Passes *passes, int threads) {
+    const uint32_t blocks = (rows->pairs.count + BLOCK - 1) / BLOCK;
+    const Kernel *kernel = &rows->pairs.kernel;
+    const CorrectionJob job = {.pairs = &rows->pairs,
+                               .shape = {rows->shape[0].data, rows->shape[1].data},
+                               .gradients = rows->gradients.data,
+                               /* three times the largest that is not corrected */
+                               .gradient_unit = rows->pairs.volume * kernel->gradient_scale / 32767.0f,
+                               .gradient_sum = rows->corrected_sum.data};
+#pragma omp parallel num_threads(threads)
+    {
+#pragma omp for schedule(static)
+        for (uint32_t block = 0; block < blocks; block++)
+            passes->shape(&job, block);
+#pragma omp for schedule(static)
+        for (uint32_t block = 0; block < blocks; block++)
+            passes->correct(&job, block);
+    }
+    rows->corrected = rows->pairs;
+    rows->corrected.gradients = job.gradients;
+    rows->corrected.gradient_unit = job.gradient_unit;
+    rows->corrected.gradient_sum = (const Float4 *)job.gradient_sum;
+}
+
 void rows_free(Rows *rows) {
+    buffer_free(&rows->gradients);
+    buffer_free(&rows->corrected_sum);
+    buffer_free(&rows->shape[0]);
+    buffer_free(&rows->shape[1]);
     buffer_free(&rows->pool);
     buffer_free(&rows->weights);
     buffer_free(&rows->slices);

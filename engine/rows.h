@@ -15,6 +15,8 @@ typedef struct RowShare {
 
 typedef struct Rows {
     PairData pairs;
+    PairData
+        corrected; /* the same pairs with gradients that are right for linear fields, after rows_correct */
     uint16_t *neighbours; /* [particles] fluid and boundary */
     bool wide;
     /* pool of row entries: threads take chunks, slices take from their thread's chunk */
@@ -22,6 +24,7 @@ typedef struct Rows {
     uint32_t pool_entries;
     atomic_uint pool_used;
     RowShare shares[ROWS_MAX_THREADS];
+    Buffer gradients, corrected_sum, shape[2];
     Buffer scratch; /* Scratch of every thread */
 } Rows;
 
@@ -39,6 +42,10 @@ typedef struct RowsJob {
     int threads;
 } RowsJob;
 bool rows_build(Rows *rows, const RowsJob *job, Err *err);
+/* Room for `shape`, the moments that boundary_apply adds for rows_correct. */
+bool rows_reserve_correction(Rows *rows, const Particles *particles, Err *err);
+/* Makes `corrected` from rows that are complete, boundary and all. */
+void rows_correct(Rows *rows, const Passes *passes, int threads);
 void rows_free(Rows *rows);
 Scratch *rows_scratch(Rows *rows, int thread);
 size_t rows_entry_size(bool wide);

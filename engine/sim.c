@@ -239,8 +239,9 @@ static bool check_overlaps(const SkiffSim *sim, const SkiffDef *def, Err *err) {
                                       penetration(&sim->bodies[b], &sim->bodies[a]));
             if (depth > tolerance)
                 good = err_add(err, ERR_INPUT,
-                               "RigidBodies[%d]: overlaps RigidBodies[%d] by %.3g m (allowed: %.3g m)", a, b,
-                               depth, tolerance);
+                               "RigidBodies[%d]: overlaps RigidBodies[%d] by at least %.3g m (allowed: less "
+                               "than %.3g m)",
+                               a, b, depth, tolerance);
         }
         if (sim->tank.kind == SKIFF_GEOMETRY_NONE || def->sea.on)
             continue; /* the sea goes on behind a window's walls */

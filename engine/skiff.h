@@ -48,6 +48,8 @@ typedef struct SkiffDriveDef {
 #undef PARAM_ENUM
 
 /* Values of the enums of drive.inl, in the order of their names. */
+/* The same of params.inl. */
+enum { SKIFF_SOLVER_GCR, SKIFF_SOLVER_JACOBI, SKIFF_SOLVER_SPLIT };
 enum { SKIFF_THRUST_AT_CENTRE, SKIFF_THRUST_AT_PROPELLER };
 enum { SKIFF_STEERING_TORQUE, SKIFF_STEERING_RUDDER };
 enum { SKIFF_HOLD_PROPORTIONAL, SKIFF_HOLD_BANGBANG };

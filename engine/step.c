@@ -2,7 +2,9 @@
  *
  * [Carensac2023 alg. 2], with the pressure solves of dfsph.c:
  *   thrust and steering -> emit blocks -> move body samples -> sort -> search -> boundary terms -> divergence
- * solve -> gravity and viscosity -> density solve -> advance. */
+ * solve -> gravity and viscosity -> density solve -> advance.
+ * pressureSolver split has no divergence solve; its density solve is two, for velocities and for positions.
+ */
 #define _POSIX_C_SOURCE 200809L
 #include "sim.h"
 
@@ -67,12 +69,24 @@ static bool find_neighbours(SkiffSim *sim, Err *err) {
     return rows_build(&sim->rows, &job, err);
 }
 
+static bool splits(const SkiffSim *sim) {
+    return sim->params.pressure_solver == SKIFF_SOLVER_SPLIT;
+}
+
 static bool add_boundary(SkiffSim *sim, Err *err) {
     const RowsJob job = rows_job(sim);
-    return boundary_apply(&sim->boundary, &sim->rows, &job, err);
+    if (splits(sim) && !rows_reserve_correction(&sim->rows, &sim->particles, err))
+        return false;
+    if (!boundary_apply(&sim->boundary, &sim->rows, &job, err))
+        return false;
+    if (splits(sim))
+        rows_correct(&sim->rows, sim->passes, sim->threads);
+    return true;
 }
 
 static void solve_divergence(SkiffSim *sim) {
+    if (splits(sim))
+        return;
     const DfsphProblem problem = step_problem(sim);
     const SolveResult result = dfsph_solve(&sim->dfsph, &problem, SOLVE_DIVERGENCE);
     sim->stats.divergence_iterations = result.iterations;
@@ -84,9 +98,18 @@ static void apply_forces(SkiffSim *sim) {
     forces_apply(sim, &problem);
 }
 
-static void solve_density(SkiffSim *sim) {
+static void solve_flow(SkiffSim *sim) {
     const DfsphProblem problem = step_problem(sim);
-    const SolveResult result = dfsph_solve(&sim->dfsph, &problem, SOLVE_DENSITY);
+    const SolveResult result = dfsph_solve(&sim->dfsph, &problem, SOLVE_FLOW);
+    sim->stats.divergence_iterations = result.iterations;
+    sim->stats.divergence_error_percent = 100.0 * result.error;
+}
+
+static void solve_density(SkiffSim *sim) {
+    if (splits(sim))
+        solve_flow(sim);
+    const DfsphProblem problem = step_problem(sim);
+    const SolveResult result = dfsph_solve(&sim->dfsph, &problem, splits(sim) ? SOLVE_SHIFT : SOLVE_DENSITY);
     sim->stats.density_iterations = result.iterations;
     sim->stats.residual_percent = 100.0 * result.residual;
 }
@@ -95,9 +118,10 @@ void sim_add_pressures(SkiffSim *sim) {
     float *total = sim->pressure.data;
     const Particles *particles = &sim->particles;
     const float unit = sim->params.rest_density / (sim->params.time_step * sim->params.time_step);
+    const float second = splits(sim) ? 0.0f : 1.0f; /* what shifts particles is no pressure */
 #pragma omp parallel for schedule(static) num_threads(sim->threads)
     for (uint32_t i = 0; i < particles->count; i++)
-        total[i] = unit * (particles->pressure[i] + particles->pressure_divergence[i]);
+        total[i] = unit * (particles->pressure[i] + second * particles->pressure_divergence[i]);
 }
 
 /* Pressure of this step and the forces of the fluid on tank and bodies. */
@@ -116,6 +140,7 @@ static AdvanceSums advance_block(SkiffSim *sim, uint32_t block) {
     const Particles *particles = &sim->particles;
     const float dt = sim->params.time_step;
     const float *density = sim->rows.pairs.density;
+    const Float4 *motion = splits(sim) ? sim->dfsph.guess : particles->velocity;
     const uint32_t begin = block * BLOCK;
     const uint32_t end = begin + BLOCK < particles->count ? begin + BLOCK : particles->count;
     AdvanceSums sums = {0};
@@ -126,7 +151,7 @@ static AdvanceSums advance_block(SkiffSim *sim, uint32_t block) {
             continue;
         }
         for (int k = 0; k < 3; k++) {
-            x[k] += dt * v[k];
+            x[k] += dt * motion[i][k];
             sums.momentum[k] += (double)v[k];
         }
         const float speed_sq = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];

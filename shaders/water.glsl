@@ -10,6 +10,7 @@ in vec2 uv;
 layout(location = 0) out vec4 color;
 
 const float NEVER = 1e9;
+const vec3 OCEAN_DEEP = vec3(0.010, 0.135, 0.200), TANK_DEEP = vec3(0.03, 0.26, 0.33);
 const float FOAM_MOST = 2.3, FOAM_HALF = 0.6, FOAM_LEAST = 0.06;
 
 struct Water {
@@ -112,6 +113,20 @@ float power_of_64(float x) {
     return x * x;
 }
 
+// The sun in a mirror that looks at `up`.
+float sun_glint(vec3 up) {
+    float broad = power_of_64(max(dot(up, sun.xyz), 0.0)), narrow = broad * broad;
+    narrow *= narrow; // 256
+    narrow *= narrow * narrow * narrow; // 1024
+    return 1.3 * narrow + 0.20 * broad;
+}
+
+// Smooth sea far behind, as one sees it through a thin sheet.
+vec3 sea_beyond(vec3 direction, vec3 air) {
+    float grazing = 1.0 + min(direction.y, 0.0), grazing_sq = grazing * grazing;
+    return mix(OCEAN_DEEP, air, 0.7 * grazing_sq * grazing_sq * grazing);
+}
+
 vec3 shade(Water water, vec3 direction, float ray_length, vec3 background, vec3 air) {
     vec3 n = water.normal;
     float far = water.depth * ray_length;
@@ -133,11 +148,7 @@ vec3 shade(Water water, vec3 direction, float ray_length, vec3 background, vec3 
     up.y = abs(up.y) + 0.02 + 0.16 * ground.w * smoothstep(0.02, 0.6, footprint);
     up = normalize(up);
     vec3 mirrored = sky(up);
-    float towards_sun = max(dot(up, sun.xyz), 0.0);
-    float broad = power_of_64(towards_sun), narrow = broad * broad;
-    narrow *= narrow; // 256
-    narrow *= narrow * narrow * narrow; // 1024
-    float glint = 1.3 * narrow + 0.20 * broad;
+    float glint = sun_glint(up);
     vec2 bend = (mat3(view) * (n - vec3(0.0, max(n.y, 0.0), 0.0))).xy;
     vec4 mesh_mirrored = vec4(0.0);
     if (HAS_MESHES)
@@ -147,17 +158,17 @@ vec3 shade(Water water, vec3 direction, float ray_length, vec3 background, vec3 
 
     vec2 sums = !HAS_PARTICLES ? vec2(0.0) : textureLod(thickness_image, uv, 0.0).rg;
     bool ocean = edge.z > 0.0;
-    vec3 deep = ocean ? vec3(0.010, 0.135, 0.200) : vec3(0.03, 0.26, 0.33);
+    vec3 deep = ocean ? OCEAN_DEEP : TANK_DEEP;
     // Faces turned to the sun let more light in.
     deep *= max(1.0 + 1.3 * dot(n.xz, sun.xz), 0.6);
     vec3 absorption = ocean ? vec3(3.2, 1.05, 0.75) : vec3(0.95, 0.24, 0.15);
     // Light through thin crests and steep faces.
-    float crest = clamp((water.place.y - eye.w) * 4.0 + 0.10, 0.0, 1.0) * water.fluid;
+    float height = water.place.y - eye.w;
+    float crest = clamp(height * 4.0 + 0.10, 0.0, 1.0) * water.fluid;
     float through = 0.5 - 0.5 * dot(direction, sun.xyz);
     deep += vec3(0.008, 0.135, 0.125) * crest * (0.35 + 0.65 * through);
     deep += vec3(0.0, 0.020, 0.024) * min((1.0 - n.y) * 5.0, 1.5);
     // What lies on the sea is known from above; sheets and crests in the air carry their own.
-    float height = water.place.y - eye.w;
     float own_foam = ocean ? water.fluid * smoothstep(0.10, 0.30, height) : 1.0;
     float foam = mix(ocean ? foam_afloat(water.place.xz) : 0.0, sums.g, own_foam);
     deep += vec3(0.03, 0.16, 0.16) * (1.0 - exp(-0.6 * foam)); // bubbles below
@@ -167,11 +178,9 @@ vec3 shade(Water water, vec3 direction, float ray_length, vec3 background, vec3 
     vec3 c = mix(behind.rgb * clear + deep * (1.0 - clear), mirrored, mirror) + vec3(1.0, 0.88, 0.68) * glint;
     float light = 0.78 + 0.26 * max(dot(n, sun.xyz), 0.0);
     // Sheets and drops in the air are full of small curved faces: brighter than what is behind them.
-    float airborne = ocean ? smoothstep(0.16, 0.26, water.place.y - eye.w) : 0.7;
+    float airborne = ocean ? smoothstep(0.16, 0.26, height) : 0.7;
     float thin = airborne * water.fluid * (1.0 - smoothstep(0.12, 0.40, sums.r));
-    float level_mirror = 1.0 + min(direction.y, 0.0), beyond_sq = level_mirror * level_mirror;
-    vec3 beyond = ocean ? mix(vec3(0.010, 0.135, 0.200), air, 0.7 * beyond_sq * beyond_sq * level_mirror) : c;
-    c = mix(c, mix(beyond, vec3(0.86, 0.92, 0.96) * light, 0.55), thin);
+    c = mix(c, mix(ocean ? sea_beyond(direction, air) : c, vec3(0.86, 0.92, 0.96) * light, 0.55), thin);
     c = mix(c, vec3(0.93, 0.97, 1.0) * light, foam_cover(water.place.xz, foam, level) * (1.0 - 0.5 * thin));
     return ocean ? mix(c, air, 1.0 - exp(-0.0035 * max(far - 6.0, 0.0))) : c;
 }

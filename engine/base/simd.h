@@ -2,8 +2,8 @@
  *
  * Every operation here gives the same bits on every path (IEEE single operations, explicit fused
  * multiply-add, fixed reduction trees), so a pass written with it once gives the same result on every
- * instruction set. No approximate instruction (rcp, rsqrt) is used: they differ between vendors. Included by
- * passes.c only, which defines SIMD_AVX512, SIMD_AVX2 or neither. */
+ * instruction set. No approximate instruction (rcp, rsqrt) is used: they differ between vendors. pair.h
+ * defines SIMD_AVX512, SIMD_AVX2 or neither; for all other files this is plain C. */
 #ifndef SKIFF_BASE_SIMD_H
 #define SKIFF_BASE_SIMD_H
 

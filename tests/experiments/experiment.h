@@ -26,6 +26,7 @@ typedef struct Experiment {
     const char *name;
     const char *folder;
     int threads;
+    int solver;    /* SKIFF_SOLVER_*, the option --solver; -1: not given */
     double radius; /* m; of programs that take --radius */
     int failures;
     double start; /* s, monotonic */
@@ -48,11 +49,28 @@ static inline void experiment_need(bool good, const Err *err) {
     exit((int)err->code);
 }
 
+/* Value of the setting pressureSolver named `name`, -1: none. */
+static inline int experiment_solver(const char *name) {
+    int count;
+    const SkiffParamInfo *info = skiff_param_infos(&count);
+    while (count-- > 0 && strcmp(info->key, "pressureSolver") != 0)
+        info++;
+    const size_t length = strlen(name);
+    int value = 0;
+    for (const char *at = info->names;; at = strchr(at, '|') + 1, value++) {
+        if (strncmp(at, name, length) == 0 && (at[length] == '|' || at[length] == '\0'))
+            return value;
+        if (strchr(at, '|') == NULL)
+            return -1;
+    }
+}
+
 /* With --radius R for particles of another size than `radius`; NaN: there is no such option. */
 static inline Experiment experiment_begin_sized(const char *name, double radius, int argc, char **argv) {
     Experiment experiment = {.name = name,
                              .folder = "out/experiments",
                              .threads = 1,
+                             .solver = -1,
                              .radius = radius,
                              .start = experiment_clock()};
     for (int k = 1; k < argc; k++) {
@@ -61,10 +79,12 @@ static inline Experiment experiment_begin_sized(const char *name, double radius,
             experiment.threads = atoi(argv[++k]);
         } else if (has_value && strcmp(argv[k], "--out") == 0) {
             experiment.folder = argv[++k];
+        } else if (has_value && strcmp(argv[k], "--solver") == 0 && experiment_solver(argv[k + 1]) >= 0) {
+            experiment.solver = experiment_solver(argv[++k]);
         } else if (has_value && !isnan(radius) && strcmp(argv[k], "--radius") == 0) {
             experiment.radius = atof(argv[++k]);
         } else {
-            fprintf(stderr, "usage: exp_%s [--threads N] [--out DIR]%s\n", name,
+            fprintf(stderr, "usage: exp_%s [--threads N] [--out DIR] [--solver NAME]%s\n", name,
                     isnan(radius) ? "" : " [--radius R]");
             exit(ERR_USAGE);
         }
@@ -232,6 +252,8 @@ static inline SkiffDef experiment_def(const Experiment *experiment, float radius
     SkiffDef def = skiff_def_default();
     def.params.boundary_offset = EXPERIMENT_OFFSET;
     def.threads = experiment->threads;
+    if (experiment->solver >= 0)
+        def.params.pressure_solver = experiment->solver;
     def.params.particle_radius = radius;
     def.params.time_step = dt;
     return def;

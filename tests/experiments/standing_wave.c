@@ -12,6 +12,9 @@
  * from exp(-2 nu k^2 T), below 0.1 % in real water. Aim: at least 0.90 a period. That is a known open
  * problem of the method, printed as met or missed and not judged.
  *
+ * With pressureSolver split, whose purpose this is; --solver gcr shows the default: too fast by 4 to 5 %, and
+ * 0.80 kept.
+ *
  * Two more runs judge nothing and show where deviations come from: half the amplitude (a period that
  * shortens with the amplitude is the mark of water that resists small shear like a solid, see vortex.c)
  * and no viscosity. */
@@ -144,6 +147,8 @@ static void wave(Experiment *experiment, const Case *wanted) {
 
 int main(int argc, char **argv) {
     Experiment experiment = experiment_begin("standing_wave", argc, argv);
+    if (experiment.solver < 0)
+        experiment.solver = SKIFF_SOLVER_SPLIT;
     const Case cases[] = {
         {"long", 2.35f, 0.02f, 12, 0.1, true},
         {"deep", 1.2f, 0.02f, 24, 0.1, true},

@@ -7,6 +7,8 @@
  * Expected of a fluid of viscosity nu: exp(-2 nu k^2 t), so nu = -d ln U / dt / (2 k^2), whatever U. Water
  * has 1e-6 m^2/s; XSPH with 0.02 a step at this size stands for about 2e-3.
  *
+ * With pressureSolver split; --solver gcr shows the glass.
+ *
  * Informational, nothing is judged: a viscosity that grows as U falls, and a slow vortex that stops and
  * turns back, show a yield stress: the settled particles resist small shear like a solid. It is the noise
  * floor of every slow motion in the other experiments. */
@@ -47,6 +49,8 @@ static double vortex_project(const Vortex *vortex, const SkiffSim *sim, double p
 
 int main(int argc, char **argv) {
     Experiment experiment = experiment_begin("vortex", argc, argv);
+    if (experiment.solver < 0)
+        experiment.solver = SKIFF_SOLVER_SPLIT;
     SkiffDef def = experiment_def(&experiment, 0.025f, 0.003f);
     experiment_tank(&def, 1.0f, 0.8f, 1.0f);
     const SkiffBlockDef block = experiment_block(&def, 19, 12, 19);

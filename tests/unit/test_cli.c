@@ -260,6 +260,15 @@ static void the_engine_reports_with_file_and_path(void **state) {
     expect("check twins.json", ERR_INPUT, NULL, "twins.json: RigidBodies[1]");
 }
 
+static void a_scene_without_fluid_is_said_to_have_none(void **state) {
+    (void)state;
+    write_text("dry.json",
+               "{\"version\": 1, \"Tank\": {\"type\": \"box\", \"min\": [0, 0, 0], \"max\": [1, 1, 1]}}");
+    Result result = finish(start("check dry.json"));
+    assert_non_null(strstr(result.err, "particles         0: the scene has no fluid\n"));
+    drop(&result);
+}
+
 static void check_prints_a_scene_and_writes_nothing(void **state) {
     (void)state;
     assert_int_equal(mkdir("empty", 0755), 0);
@@ -750,6 +759,7 @@ int main(void) {
         cmocka_unit_test(help_lines_are_short),
         cmocka_unit_test(bad_scenes_exit_with_3),
         cmocka_unit_test(the_engine_reports_with_file_and_path),
+        cmocka_unit_test(a_scene_without_fluid_is_said_to_have_none),
         cmocka_unit_test(check_prints_a_scene_and_writes_nothing),
         cmocka_unit_test(the_schema_is_printed),
         cmocka_unit_test(a_run_writes_its_results),

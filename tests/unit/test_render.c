@@ -334,29 +334,31 @@ static void number_of_threads_does_not_matter(void **state) {
     for (int i = 0; i < COUNT; i++)
         fade[i] = i % 5 == 0 ? 0.5f : 1.0f;
     int threads = omp_get_max_threads();
-    for (int i = 0; i < 3 * 3 * 2 * 2; i++) {
-        const int *size = sizes[i / 12];
+    for (int i = 0; i < 3 * 2; i++) {
+        const int *size = sizes[i / 2];
         Err err = {0};
         GfxDef def = gfx_def_default();
         def.width = size[0];
         def.height = size[1];
         def.supersample = size[2];
         def.look = i % 2 ? GFX_LOOK_WATER : GFX_LOOK_PARTICLES;
-        scene.ocean.enabled = i / 2 % 2;
-        memcpy(scene.camera.eye, eyes[i / 4 % 3], sizeof scene.camera.eye);
-        memcpy(scene.camera.target, (float[3]){0.6f, -0.1f, 0.4f}, sizeof scene.camera.target);
         Gfx *gfx = gfx_create(&def, &err);
         if (!gfx) {
             assert_int_equal(err.code, ERR_GL);
             skip();
         }
-        omp_set_num_threads(1);
-        assert_true(gfx_draw(gfx, &scene, one, &err));
-        omp_set_num_threads(3);
-        assert_true(gfx_draw(gfx, &scene, three, &err));
-        omp_set_num_threads(threads);
+        for (int k = 0; k < 3 * 2; k++) {
+            scene.ocean.enabled = k % 2;
+            memcpy(scene.camera.eye, eyes[k / 2], sizeof scene.camera.eye);
+            memcpy(scene.camera.target, (float[3]){0.6f, -0.1f, 0.4f}, sizeof scene.camera.target);
+            omp_set_num_threads(1);
+            assert_true(gfx_draw(gfx, &scene, one, &err));
+            omp_set_num_threads(3);
+            assert_true(gfx_draw(gfx, &scene, three, &err));
+            omp_set_num_threads(threads);
+            assert_memory_equal(one, three, (size_t)size[0] * (size_t)size[1] * 3);
+        }
         gfx_destroy(gfx);
-        assert_memory_equal(one, three, (size_t)size[0] * (size_t)size[1] * 3);
     }
 }
 

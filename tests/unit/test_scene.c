@@ -87,10 +87,11 @@ static const struct {
     {"\"Configuration\": {\"gravitation\": [0, -9.81, true]}",
      "s.json: Configuration.gravitation[2]: expected a number from -1000 to 1000 m/s^2, found true"},
     {"\"Configuration\": {\"pressureSolver\": \"jakobi\"}",
-     "s.json: Configuration.pressureSolver: expected one of gcr, jacobi, found \"jakobi\"; did you mean "
+     "s.json: Configuration.pressureSolver: expected one of gcr, jacobi, split, found \"jakobi\"; did you "
+     "mean "
      "jacobi?"},
     {"\"Configuration\": {\"pressureSolver\": 1}",
-     "s.json: Configuration.pressureSolver: expected one of gcr, jacobi, found 1"},
+     "s.json: Configuration.pressureSolver: expected one of gcr, jacobi, split, found 1"},
     {"\"Configuration\": {\"domainMin\": [0, 0, 0]}",
      "s.json: Configuration: domainMin and domainMax go together, one of them is missing"},
     {"\"Configuration\": {\"domainMin\": [0, 0, 0], \"domainMax\": [1, 0, 1]}",

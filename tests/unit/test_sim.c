@@ -88,7 +88,7 @@ static void test_refusals(void **state) {
     refuse(&scene, "particles need about");
     scene_make(&scene);
     scene.def.body_count = 2;
-    refuse(&scene, "RigidBodies[1]: overlaps RigidBodies[0] by 0.05 m (allowed: 0.025 m)");
+    refuse(&scene, "RigidBodies[1]: overlaps RigidBodies[0] by at least 0.05 m (allowed: less than 0.025 m)");
     scene_make(&scene);
     scene.def.body_count = 1;
     scene.bodies[0].geometry.translation[0] = 0.3f;

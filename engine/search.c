@@ -1,0 +1,341 @@
+/* Who is near whom: the neighbour search and the terms of walls and bodies, compiled once per instruction
+ * set.
+ *
+ * The 27 cells around a particle are nine runs of particles; they are copied once a cell, and each of its
+ * particles keeps those within a support radius. Sixteen lists become a slice's rows, with densities and sums
+ * of gradients on the way. */
+#include "pair.h"
+
+/* ---- Neighbour search ---- */
+
+/* The cell whose candidates lie in scratch. */
+typedef struct SearchCell {
+    uint32_t index;
+    int candidate_count;
+} SearchCell;
+
+/* Copies the particles of the 27 cells around `cell` into scratch, run by run, and fills the last lanes with
+ * points that are near nothing. Returns how many there are, -1 for too many. */
+static int gather_candidates(const SearchJob *job, uint32_t cell, Scratch *scratch) {
+    const CellGrid *grid = job->grid;
+    const int32_t column = grid->size[1], slab = grid->size[1] * grid->size[2];
+    int n = 0;
+    for (int run = 0; run < 9; run++) {
+        const int64_t middle = (int64_t)cell + (run / 3 - 1) * slab + (run % 3 - 1) * column;
+        const uint32_t begin = grid->start[middle - 1], end = grid->start[middle + 2];
+        if (n + (int64_t)(end - begin) > MAX_CANDIDATES)
+            return -1;
+        for (uint32_t j = begin; j < end; j += LANES) {
+            Vf x, y, z, unused;
+            vf_load4(job->position + j, &x, &y, &z, &unused);
+            const int to = n + (int)(j - begin);
+            vf_store(scratch->x + to, x);
+            vf_store(scratch->y + to, y);
+            vf_store(scratch->z + to, z);
+            const Vi index = vi_add(vi_set((int32_t)j), vi_lane());
+            vi_store(scratch->halves + to, vi_add(index, index));
+        }
+        n += (int)(end - begin);
+    }
+    vf_store(scratch->x + n, vf_set(1e18f));
+    return n;
+}
+
+typedef struct NeighbourCount {
+    int all, near;
+} NeighbourCount;
+
+/* Neighbours of particle i in the order of the candidates, the near ones first; all is -1 when there are too
+ * many. */
+static NeighbourCount find_neighbours(const SearchJob *job, int candidate_count, uint32_t i, Scratch *scratch,
+                                      int32_t *list) {
+    const Vf x = vf_set(job->position[i][0]), y = vf_set(job->position[i][1]),
+             z = vf_set(job->position[i][2]);
+    const Vf limit = vf_set(job->kernel.support * job->kernel.support);
+    const Vf near_limit = vf_set(near_distance_sq(&job->kernel));
+    const Vi self = vi_set((int32_t)(2 * i));
+    int near = 0, far = 0;
+    for (int c = 0; c < candidate_count; c += LANES) {
+        const Vf dx = vf_sub(x, vf_load(scratch->x + c));
+        const Vf dy = vf_sub(y, vf_load(scratch->y + c));
+        const Vf dz = vf_sub(z, vf_load(scratch->z + c));
+        const Vf distance_sq = vf_fma(dx, dx, vf_fma(dy, dy, vf_mul(dz, dz)));
+        const Vm is_near = vf_less(distance_sq, near_limit);
+        const Vm is_far = vf_less(distance_sq, limit) & (Vm)~is_near;
+        const Vm is_self = vi_equal(vi_load(scratch->halves + c), self);
+        near += vi_compress(list + near, scratch->halves + c, is_near & (Vm)~is_self);
+        far += vi_compress(scratch->far + far, scratch->halves + c, is_far);
+        if (near + far > MAX_NEIGHBOURS)
+            return (NeighbourCount){-1, 0};
+    }
+    for (int k = 0; k < far; k += LANES)
+        vi_store(list + near + k, vi_load(scratch->far + k));
+    return (NeighbourCount){near + far, near};
+}
+
+static inline void entry_store_place(uint8_t *entries, uint32_t entry, bool wide, Vi place) {
+    if (wide)
+        vi_store(((RowEntryWide *)entries)[entry].place, place);
+    else
+        vi_store_i16(((RowEntry *)entries)[entry].place, place);
+}
+
+/* What the passes read is the rounded factor, so the sums are made of it, too. */
+static inline Vf entry_store_factor(uint8_t *entries, uint32_t entry, bool wide, Vf factor) {
+    const Vi rounded = vi_round(vf_mul(factor, vf_set(FACTOR_STEPS)));
+    vi_store_i16((int16_t *)entry_factor(entries, entry, wide), rounded);
+    return vf_from_int(rounded);
+}
+
+/* Turns the sixteen lists in scratch into row entries, densities and gradient sums. True if all offsets fit
+ * 16 bits or wide. */
+static bool pack_slice(const SearchJob *job, uint32_t first, const int32_t counts[SLICE],
+                       const SliceRows *rows, const Scratch *scratch) {
+    const Vi count = vi_load(counts), minus_first = vi_set(-2 * (int32_t)first);
+    Vf x, y, z, w;
+    vf_load4(job->position + first, &x, &y, &z, &w);
+    Vf sum_x = vf_zero(), sum_y = vf_zero(), sum_z = vf_zero(), sum_sq = vf_zero(), sum_w = vf_zero();
+    Vm misfit = 0;
+    int32_t halves[SLICE][SLICE]; /* of the next sixteen entries, from the first particle of all */
+    uint32_t entry = rows->start;
+    for (int k = 0; k < rows->length; k++, entry++) {
+        if (k % SLICE == 0)
+            vi_transpose16(scratch->list[0] + k, MAX_NEIGHBOURS + LANES, halves);
+        const Vm valid = vi_less(vi_set(k), count);
+        const Vi place = vi_add(vi_load(halves[k % SLICE]), minus_first);
+        misfit |= vi_less(place, vi_set(INT16_MIN)) | vi_less(vi_set(INT16_MAX), place);
+        entry_store_place(job->entries, entry, job->wide, place);
+        Vf nx, ny, nz;
+        vf_gather4_i32(job->position, halves[k % SLICE], &nx, &ny, &nz, &w);
+        const Vf dx = vf_sub(x, nx), dy = vf_sub(y, ny), dz = vf_sub(z, nz);
+        const Vf distance_sq = vf_fma(dx, dx, vf_fma(dy, dy, vf_mul(dz, dz)));
+        Vf factor, weight;
+        pair_kernel(&job->kernel, distance_sq, &factor, &weight);
+        factor = entry_store_factor(job->entries, entry, job->wide, vf_mask(valid, factor));
+        sum_x = vf_fma(factor, dx, sum_x);
+        sum_y = vf_fma(factor, dy, sum_y);
+        sum_z = vf_fma(factor, dz, sum_z);
+        sum_sq = vf_fma(vf_mul(factor, factor), distance_sq, sum_sq);
+        weight = vf_mask(valid, weight);
+        sum_w = vf_add(sum_w, weight);
+        vf_store_i16(job->weights + (size_t)entry * SLICE,
+                     vf_mul(weight, vf_set(32767.0f / job->kernel.w_scale)));
+    }
+    const Vf unit = vf_set(-job->factor_unit), unit_sq = vf_mul(unit, unit);
+    vf_store4(job->gradient_sum + first, vf_mul(unit, sum_x), vf_mul(unit, sum_y), vf_mul(unit, sum_z),
+              vf_mul(unit_sq, sum_sq));
+    vf_store(job->density + first, vf_mul(vf_set(job->volume), vf_add(sum_w, vf_set(job->kernel.w_scale))));
+    return job->wide || misfit == 0;
+}
+
+/* Lists the neighbours of a slice's particles in scratch, all to the length of the longest: what is missing
+ * is the particle itself. all is -1, and *fault the particle, when one has too many. */
+static NeighbourCount list_neighbours(const SearchJob *job, uint32_t first, SearchCell *cell,
+                                      Scratch *scratch, int32_t counts[SLICE], uint32_t *fault) {
+    NeighbourCount most = {0, 0};
+    for (uint32_t l = 0; l < SLICE; l++) {
+        const uint32_t i = first + l;
+        counts[l] = 0;
+        if (i >= job->count)
+            continue;
+        job->neighbours[i] = 0;
+        if (job->frozen != NULL && job->frozen[i])
+            continue;
+        NeighbourCount found = {-1, 0};
+        if (job->cell[i] != cell->index) {
+            cell->index = job->cell[i];
+            cell->candidate_count = gather_candidates(job, cell->index, scratch);
+        }
+        if (cell->candidate_count >= 0)
+            found = find_neighbours(job, cell->candidate_count, i, scratch, scratch->list[l]);
+        if (found.all < 0) {
+            *fault = i;
+            return found;
+        }
+        counts[l] = found.all;
+        job->neighbours[i] = (uint16_t)found.all;
+        most.all = found.all > most.all ? found.all : most.all;
+        most.near = found.near > most.near ? found.near : most.near;
+    }
+    for (uint32_t l = 0; l < SLICE; l++)
+        for (int k = counts[l]; k < most.all; k += LANES)
+            vi_store(scratch->list[l] + k, vi_set((int32_t)(2 * (first + l))));
+    return most;
+}
+
+int PASSES_NAME(search_)(const SearchJob *job, uint32_t block, int thread, Scratch *scratch,
+                         uint32_t *fault) {
+    SearchCell cell = {.index = UINT32_MAX};
+    int status = SEARCH_OK;
+    for (uint32_t slice = block * BLOCK_SLICES; slice < (block + 1) * BLOCK_SLICES; slice++) {
+        const uint32_t first = slice * SLICE;
+        int32_t counts[SLICE];
+        const NeighbourCount found = list_neighbours(job, first, &cell, scratch, counts, fault);
+        if (found.all < 0)
+            return SEARCH_TOO_DENSE;
+        SliceRows *rows = &job->slices[slice];
+        *rows = (SliceRows){.length = (uint16_t)found.all, .near = (uint16_t)found.near};
+        if (first >= job->count) {
+            for (uint32_t i = first; i < first + SLICE; i++) {
+                memset(job->gradient_sum[i], 0, sizeof(Float4));
+                job->density[i] = 0.0f;
+            }
+            continue;
+        }
+        rows->start = job->allocate(job->rows, thread, rows->length);
+        if (rows->start == UINT32_MAX)
+            return SEARCH_NEEDS_MEMORY;
+        if (!pack_slice(job, first, counts, rows, scratch))
+            status = SEARCH_NEEDS_WIDE;
+    }
+    return status;
+}
+
+/* ---- Walls and bodies ---- */
+
+/* Sums over one object's samples near one particle, a lane a sample. */
+typedef struct ContactSum {
+    int32_t object;
+    int count;
+    Vf weight, g[3], t[3], m[6]; /* m: xx, yy, zz, xy, xz, yz of -sum psi_b grad W_ib (x_i - x_b)^T */
+} ContactSum;
+
+typedef struct ContactSums {
+    int count;
+    ContactSum sums[MAX_CONTACT_OBJECTS];
+} ContactSums;
+
+static ContactSum *contact_sum_of(ContactSums *sums, int32_t object) {
+    for (int k = 0; k < sums->count; k++)
+        if (sums->sums[k].object == object)
+            return &sums->sums[k];
+    if (sums->count == MAX_CONTACT_OBJECTS)
+        return NULL;
+    ContactSum *sum = &sums->sums[sums->count++];
+    sum->object = object;
+    sum->count = 0;
+    sum->weight = vf_zero();
+    for (int k = 0; k < 3; k++)
+        sum->g[k] = sum->t[k] = sum->m[k] = sum->m[3 + k] = vf_zero();
+    return sum;
+}
+
+/* Adds up to sixteen samples beginning at s; near: lanes in reach. */
+static bool contact_add(const BoundaryJob *job, const SampleSet *set, uint32_t s, Vm near, const Vf d[3],
+                        ContactSums *sums) {
+    const Vf volume = vf_load(set->volume + s);
+    const Vf position[3] = {vf_load(set->x + s), vf_load(set->y + s), vf_load(set->z + s)};
+    const Vi object = vi_load(set->object + s);
+    const Vf distance_sq = vf_fma(d[0], d[0], vf_fma(d[1], d[1], vf_mul(d[2], d[2])));
+    Vf factor, weight;
+    pair_kernel(&job->kernel, distance_sq, &factor, &weight);
+    factor = vf_mul(vf_mul(factor, vf_set(-job->kernel.gradient_scale * job->kernel.inv_support)), volume);
+    weight = vf_mul(weight, volume);
+    uint32_t left = near;
+    while (left != 0) {
+        const int32_t id = set->object[s + (uint32_t)__builtin_ctz(left)];
+        const Vm mine = (Vm)(left & vi_equal(object, vi_set(id)));
+        left &= ~(uint32_t)mine;
+        ContactSum *sum = contact_sum_of(sums, id);
+        if (sum == NULL)
+            return false;
+        Vf g[3], arm[3];
+        for (int k = 0; k < 3; k++) {
+            g[k] = vf_mask(mine, vf_mul(factor, d[k]));
+            arm[k] = vf_sub(position[k], vf_set(job->centres[id][k]));
+            sum->g[k] = vf_add(sum->g[k], g[k]);
+        }
+        for (int k = 0; k < 3; k++) {
+            const int a = (k + 1) % 3, b = (k + 2) % 3;
+            sum->t[k] = vf_fma(arm[a], g[b], vf_fnma(arm[b], g[a], sum->t[k]));
+            sum->m[k] = vf_fnma(g[k], d[k], sum->m[k]);
+        }
+        sum->m[3] = vf_fnma(g[0], d[1], sum->m[3]);
+        sum->m[4] = vf_fnma(g[0], d[2], sum->m[4]);
+        sum->m[5] = vf_fnma(g[1], d[2], sum->m[5]);
+        sum->weight = vf_add(sum->weight, vf_mask(mine, weight));
+        sum->count += __builtin_popcount(mine);
+    }
+    return true;
+}
+
+static bool contacts_of_particle(const BoundaryJob *job, const SampleSet *set, const float *p,
+                                 ContactSums *sums) {
+    int32_t c[3];
+    for (int k = 0; k < 3; k++) {
+        c[k] = (int32_t)floorf((p[k] - set->grid.origin[k]) * set->grid.inv_size);
+        if (c[k] < 0 || c[k] >= set->grid.size[k])
+            return true;
+    }
+    const int32_t cell = cell_grid_index(&set->grid, c[0], c[1], c[2]);
+    if (!set->occupied[cell])
+        return true;
+    const Vf limit = vf_set(job->kernel.support * job->kernel.support);
+    const int32_t column = set->grid.size[1], slab = set->grid.size[1] * set->grid.size[2];
+    for (int run = 0; run < 9; run++) {
+        const int32_t middle = cell + (run / 3 - 1) * slab + (run % 3 - 1) * column;
+        const uint32_t end = set->grid.start[middle + 2];
+        for (uint32_t s = set->grid.start[middle - 1]; s < end; s += LANES) {
+            const Vf d[3] = {vf_sub(vf_set(p[0]), vf_load(set->x + s)),
+                             vf_sub(vf_set(p[1]), vf_load(set->y + s)),
+                             vf_sub(vf_set(p[2]), vf_load(set->z + s))};
+            const Vf distance_sq = vf_fma(d[0], d[0], vf_fma(d[1], d[1], vf_mul(d[2], d[2])));
+            const uint32_t valid = end - s >= LANES ? 0xffffu : (1u << (end - s)) - 1u;
+            const Vm near = (Vm)(vf_less(distance_sq, limit) & valid);
+            if (near != 0 && !contact_add(job, set, s, near, d, sums))
+                return false;
+        }
+    }
+    return true;
+}
+
+int PASSES_NAME(boundary_)(const BoundaryJob *job, uint32_t block, Scratch *scratch, uint32_t *fault) {
+    int contact_count = 0;
+    const uint32_t begin = block * BLOCK, end = begin + BLOCK < job->count ? begin + BLOCK : job->count;
+    for (uint32_t i = begin; i < end; i++) {
+        const bool shaped = job->density != NULL && job->shape[0] != NULL;
+        for (int m = 0; shaped && m < 2; m++)
+            memset(job->shape[m][i], 0, sizeof(Float4));
+        if (job->frozen != NULL && job->frozen[i])
+            continue;
+        ContactSums sums;
+        sums.count = 0;
+        for (int k = 0; k < 2; k++) {
+            if (job->sets[k]->count != 0 &&
+                !contacts_of_particle(job, job->sets[k], job->position[i], &sums)) {
+                *fault = i;
+                return -1;
+            }
+        }
+        float g[3] = {0};
+        for (int k = 0; shaped && k < sums.count; k++)
+            for (int a = 0; a < 6; a++)
+                job->shape[a / 3][i][a % 3] += vf_sum(sums.sums[k].m[a]);
+        for (int k = 0; k < sums.count; k++) {
+            const ContactSum *sum = &sums.sums[k];
+            Contact *contact = &scratch->contacts[contact_count++];
+            contact->particle = i;
+            contact->object = (uint32_t)sum->object;
+            for (int a = 0; a < 3; a++) {
+                contact->g[a] = vf_sum(sum->g[a]);
+                contact->t[a] = vf_sum(sum->t[a]);
+                g[a] += contact->g[a];
+            }
+            contact->weight = vf_sum(sum->weight);
+            if (job->density == NULL)
+                continue;
+            job->density[i] += contact->weight;
+            job->neighbours[i] = (uint16_t)(job->neighbours[i] + sum->count);
+        }
+        if (job->density == NULL)
+            continue;
+        float *sum = job->gradient_sum[i];
+        float norm_sq = 0.0f;
+        for (int a = 0; a < 3; a++) {
+            sum[a] += g[a];
+            norm_sq += sum[a] * sum[a];
+        }
+        sum[3] += norm_sq;
+    }
+    return contact_count;
+}
