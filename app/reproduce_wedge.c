@@ -20,7 +20,7 @@ static const char header[] = "t,closed_energy,absorbing_energy,closed_particles,
 static const char *const side_names[SIDE_COUNT] = {"closed end", "absorbing end"};
 
 static const double standard_step = 0.003, standard_duration = 6.6;
-static const double outflow_layer = 0.5, inflow_layer = 0.125; /* m, of the scene */
+static const double outflow_layer = 0.5, inflow_layer = 0.2; /* m, of the scene */
 /* Between these times (s) the closed half has its least energy, while its first wave stands at the end. The
  * wave is back ("at around 2.1 s") within `reflection_span` of that. */
 static const double turn_from = 1.5, turn_to = 2.2, reflection_span = 0.8;
