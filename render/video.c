@@ -208,7 +208,7 @@ bool gfx_video_add(GfxVideo *video, const uint8_t *rgb, Err *err) {
 }
 
 bool gfx_video_finish(GfxVideo *video, Err *err) {
-    if (video->frames == 0) {
+    if (video->frames == 0 && video->child > 0) { /* it did not end by itself over the first frame */
         gfx_video_abort(video);
         return true;
     }
