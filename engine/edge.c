@@ -237,19 +237,9 @@ static void drop_taken(const EdgePlace *place, RestFitted *laid) {
     laid->count = kept;
 }
 
+/* What the edge's own water may touch once it is free. */
 static bool body_is_near(const EdgePlace *place, const float p[3]) {
-    const SkiffSim *sim = place->sim;
-    for (int b = 0; b < sim->body_count; b++) {
-        double distance_sq = 0.0;
-        for (int k = 0; k < 3; k++) {
-            const double arm = (double)p[k] + sim->origin[k] - sim->bodies[b].position[k];
-            distance_sq += arm * arm;
-        }
-        const double reach = sim->bodies[b].reach + 2.0 * (double)place->support;
-        if (distance_sq < reach * reach)
-            return true;
-    }
-    return false;
+    return sim_near_body(place->sim, p, 2.0 * (double)place->support);
 }
 
 static RestPlace laid_place(const void *user, const float p[3]) {

@@ -359,6 +359,20 @@ static uint64_t hash_def(const SkiffSim *sim, const SkiffDef *def) {
     return XXH3_64bits_digest(&state);
 }
 
+bool sim_near_body(const SkiffSim *sim, const float p[3], double margin) {
+    for (int b = 0; b < sim->body_count; b++) {
+        double distance_sq = 0.0;
+        for (int k = 0; k < 3; k++) {
+            const double arm = (double)p[k] + sim->origin[k] - sim->bodies[b].position[k];
+            distance_sq += arm * arm;
+        }
+        const double reach = sim->bodies[b].reach + margin;
+        if (distance_sq < reach * reach)
+            return true;
+    }
+    return false;
+}
+
 bool sim_reserve(SkiffSim *sim, uint32_t capacity, Err *err) {
     const size_t padded = capacity + BLOCK;
     return particles_reserve(&sim->particles, capacity, err) &&

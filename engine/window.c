@@ -25,29 +25,15 @@ static float depth_in_kept(const WindowPlace *place, const float p[3]) {
     return fminf(in_old, in_new);
 }
 
-/* Bodies touch water too: is p within their bounds and a support? */
-static bool near_body(const WindowPlace *place, const float p[3]) {
-    const SkiffSim *sim = place->sim;
-    for (int b = 0; b < sim->body_count; b++) {
-        double distance_sq = 0.0;
-        for (int k = 0; k < 3; k++) {
-            const double arm = (double)p[k] + sim->origin[k] - sim->bodies[b].position[k];
-            distance_sq += arm * arm;
-        }
-        const double reach = sim->bodies[b].reach + (double)place->support;
-        if (distance_sq < reach * reach)
-            return true;
-    }
-    return false;
-}
-
 /* Points inside the water that stayed can never be added, whatever holes a wave has left there, but they lend
  * their density: the new water's neighbourhoods are full. */
 static RestPlace ring_place(const void *user, const float p[3]) {
     const WindowPlace *place = user;
     const float depth = depth_in_kept(place, p);
     if (depth < place->overlap)
-        return depth < -place->support && !near_body(place, p) ? REST_STILL : REST_IN_WATER;
+        return depth < -place->support && !sim_near_body(place->sim, p, (double)place->support)
+                   ? REST_STILL
+                   : REST_IN_WATER;
     return depth < place->overlap + place->support ? REST_IN_AIR : REST_OUTSIDE;
 }
 

@@ -87,9 +87,6 @@ static inline Vm vi_equal(Vi a, Vi b) {
 static inline Vm vi_less(Vi a, Vi b) {
     return _mm512_cmplt_epi32_mask(a, b);
 }
-static inline Vi vi_select(Vm m, Vi yes, Vi no) {
-    return _mm512_mask_blend_epi32(m, no, yes);
-}
 static inline Vf vf_load_i16(const int16_t *p) {
     return _mm512_cvtepi32_ps(vi_load_i16(p));
 }
@@ -289,10 +286,6 @@ static inline Vm vi_equal(Vi u, Vi v) {
 static inline Vm vi_less(Vi u, Vi v) {
     return vi_mask(_mm256_cmpgt_epi32(v.a, u.a), _mm256_cmpgt_epi32(v.b, u.b));
 }
-static inline Vi vi_select(Vm m, Vi yes, Vi no) {
-    return (Vi){_mm256_blendv_epi8(no.a, yes.a, vm_expand(m)),
-                _mm256_blendv_epi8(no.b, yes.b, vm_expand(m >> 8))};
-}
 static inline Vf vf_load_i16(const int16_t *p) {
     Vi i = vi_load_i16(p);
     return VF(_mm256_cvtepi32_ps(i.a), _mm256_cvtepi32_ps(i.b));
@@ -464,10 +457,6 @@ static inline Vm vi_less(Vi a, Vi b) {
     EACH_LANE m |= (Vm)(a.v[l] < b.v[l]) << l;
     return m;
 }
-static inline Vi vi_select(Vm m, Vi yes, Vi no) {
-    EACH_LANE no.v[l] = m >> l & 1 ? yes.v[l] : no.v[l];
-    return no;
-}
 static inline Vf vf_load_i16(const int16_t *p) {
     Vf r;
     EACH_LANE r.v[l] = (float)p[l];
@@ -488,32 +477,24 @@ static inline Vf vf_from_int(Vi a) {
     EACH_LANE r.v[l] = (float)a.v[l];
     return r;
 }
-static inline void vi_stream_i16_pair(int16_t *p, Vi a, Vi b) {
-    EACH_LANE p[l] = (int16_t)a.v[l];
-    EACH_LANE p[LANES + l] = (int16_t)b.v[l];
-}
-static inline void simd_stream_end(void) {}
 static inline void vf_store_i16(int16_t *p, Vf a) {
     EACH_LANE p[l] = (int16_t)lrintf(a.v[l]);
 }
-static inline void vf_gather4_i32(const Float4 *base, const int32_t *halves, Vf *x, Vf *y, Vf *z, Vf *w) {
-    EACH_LANE {
-        const float *p = float4_at(base, halves[l]);
-        x->v[l] = p[0];
-        y->v[l] = p[1];
-        z->v[l] = p[2];
-        w->v[l] = p[3];
+#define GATHER4(base, halves, x, y, z, w)                                                                    \
+    EACH_LANE {                                                                                              \
+        const float *p = float4_at(base, halves[l]);                                                         \
+        x->v[l] = p[0];                                                                                      \
+        y->v[l] = p[1];                                                                                      \
+        z->v[l] = p[2];                                                                                      \
+        w->v[l] = p[3];                                                                                      \
     }
+static inline void vf_gather4_i32(const Float4 *base, const int32_t *halves, Vf *x, Vf *y, Vf *z, Vf *w) {
+    GATHER4(base, halves, x, y, z, w)
 }
 static inline void vf_gather4_i16(const Float4 *base, const int16_t *halves, Vf *x, Vf *y, Vf *z, Vf *w) {
-    EACH_LANE {
-        const float *p = float4_at(base, halves[l]);
-        x->v[l] = p[0];
-        y->v[l] = p[1];
-        z->v[l] = p[2];
-        w->v[l] = p[3];
-    }
+    GATHER4(base, halves, x, y, z, w)
 }
+#undef GATHER4
 static inline void vf_load4(const Float4 *p, Vf *x, Vf *y, Vf *z, Vf *w) {
     EACH_LANE {
         x->v[l] = p[l][0];
