@@ -344,7 +344,8 @@ bool boundary_place(Boundary *boundary, const Body *bodies, int body_count, cons
     return boundary_sort(set, cell_size, err);
 }
 
-/* One try: contacts of every block, appended to the common list. False: a particle touches too many objects.
+/* One try: contacts of every block, appended to the common list. False: a particle touches too many objects
+ * or samples.
  */
 static bool apply_blocks(Boundary *boundary, const BoundaryJob *job, const Passes *passes, Rows *rows,
                          int threads, uint32_t *fault) {
@@ -391,8 +392,11 @@ bool boundary_apply(Boundary *boundary, Rows *rows, const RowsJob *build, Err *e
                              .shape = {rows->shape[0].data, rows->shape[1].data}};
     uint32_t fault;
     if (!apply_blocks(boundary, &job, build->passes, rows, build->threads, &fault))
-        return err_set(err, ERR_DIVERGED, "particle %llu touches more than %d walls and bodies at once",
-                       (unsigned long long)particles->id[fault], MAX_CONTACT_OBJECTS);
+        return err_set(
+            err, ERR_DIVERGED,
+            "particle %llu touches more than %d walls and bodies at once, or more than %d of their "
+            "samples lie around it",
+            (unsigned long long)particles->id[fault], MAX_CONTACT_OBJECTS, MAX_NEAR_SAMPLES - LANES);
     if (boundary->contact_count <= boundary->contact_capacity)
         return true;
     /* the terms are done, only the list was too short: make room and list the contacts alone once more */
