@@ -282,7 +282,7 @@ static bool gather_samples(const BoundaryJob *job, const SampleSet *set, const i
             const uint32_t valid = end - s >= LANES ? 0xffffu : (1u << (end - s)) - 1u;
             const Vm mine = (Vm)(vf_less(distance_sq, vf_set(limit)) & valid);
             const int to = near->count;
-            if (to + LANES > MAX_NEAR_SAMPLES)
+            if (to + __builtin_popcount(mine) > MAX_NEAR_SAMPLES)
                 return false;
             vf_compress(near->x + to, set->x + s, mine);
             vf_compress(near->y + to, set->y + s, mine);
