@@ -264,19 +264,26 @@ static bool reserve(Select *select, Err *err) {
 /* What stands beside the candidates that are left. */
 static void mark_rim(Select *select) {
     uint64_t *id = select->cloud->points.id;
-    for (uint32_t i = 0; i < select->count; i++) {
+    uint8_t *touched = select->cloud->fate.data; /* not needed any more */
+    memset(touched, 0, select->count);
+    EACH_POINT {
         if (select->state[i] != CANDIDATE)
             continue;
         RestNeighbour row[MAX_NEIGHBOURS];
         const int length = rest_row(select->pairs, i, row);
         for (int k = 0; k < length; k++) {
-            const uint32_t j = row[k].index;
-            const RestKind kind = rest_kind(id[j]);
-            if (kind == REST_EXISTING)
-                id[j] = rest_id(REST_EXISTING_RIM, id[j]);
-            else if (select->state[j] == PASSIVE && (kind == REST_FLUID || kind == REST_SUPPORT))
-                id[j] = rest_id(REST_RIM, id[j]);
+#pragma omp atomic write
+            touched[row[k].index] = 1;
         }
+    }
+    EACH_POINT {
+        const RestKind kind = rest_kind(id[i]);
+        if (!touched[i])
+            continue;
+        if (kind == REST_EXISTING)
+            id[i] = rest_id(REST_EXISTING_RIM, id[i]);
+        else if (select->state[i] == PASSIVE && (kind == REST_FLUID || kind == REST_SUPPORT))
+            id[i] = rest_id(REST_RIM, id[i]);
     }
 }
 
