@@ -237,9 +237,9 @@ static void drop_taken(const EdgePlace *place, RestFitted *laid) {
     laid->count = kept;
 }
 
-/* What the edge's own water may touch once it is free. */
+/* Could a body be felt at p? */
 static bool body_is_near(const EdgePlace *place, const float p[3]) {
-    return sim_near_body(place->sim, p, 2.0 * (double)place->support);
+    return sim_near_body(place->sim, p, (double)place->support);
 }
 
 static RestPlace laid_place(const void *user, const float p[3]) {
