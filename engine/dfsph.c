@@ -54,7 +54,7 @@ static const double STEADY_SAFETY = 0.4;
 bool dfsph_reserve(Dfsph *dfsph, uint32_t particle_capacity, uint32_t object_count, Err *err) {
     const size_t padded = particle_capacity + BLOCK, blocks = padded / BLOCK;
     const size_t bytes = padded * ((2 + DFSPH_CARRIED) * sizeof(Float4) + 7 * sizeof(float)) +
-                         blocks * DFSPH_SUMS * sizeof(double) +
+                         blocks * (DFSPH_SUMS * sizeof(double) + 1) +
                          (size_t)object_count * (2 + DFSPH_CARRIED) * sizeof *dfsph->response;
     if (!buffer_reserve(&dfsph->buffer, "pressure solver", bytes, err))
         return false;
@@ -76,6 +76,7 @@ bool dfsph_reserve(Dfsph *dfsph, uint32_t particle_capacity, uint32_t object_cou
     TAKE(inv_diagonal, padded);
     TAKE(source, padded);
     TAKE(lower, padded);
+    TAKE(still, blocks);
 #undef TAKE
     return true;
 }
@@ -143,6 +144,8 @@ static void apply_transpose(Dfsph *dfsph, const DfsphProblem *problem, const Flo
     const AccelerateJob job = {
         .operand = (const Float4 *)dfsph->operand, .base = base, .scale = scale, .result = result};
     EACH_BLOCK {
+        if (base == NULL && dfsph->still[block])
+            continue;
         problem->passes->accelerate(pairs, &job, block);
         if (problem->held != NULL)
             hold_block(problem->held, pairs, &job, block);
@@ -257,6 +260,17 @@ static inline const float *lower_of(const Dfsph *dfsph, uint32_t first) {
     return dfsph->lower + (dfsph->shifting ? first : 0);
 }
 
+/* Held pressures act on the first evaluation only; from then on a block that is held is left out. */
+static void still_block(Dfsph *dfsph, uint32_t block) {
+    const size_t first = (size_t)block * BLOCK;
+    for (size_t i = first; i < first + BLOCK; i++)
+        dfsph->operand[i][3] = 0.0f;
+    memset(dfsph->residual + first, 0, BLOCK * sizeof(float));
+    for (int a = 0; a < DFSPH_CARRIED; a++)
+        memset(dfsph->answer[a] + first, 0, BLOCK * sizeof(Float4));
+    memset(dfsph->partials + (size_t)block * DFSPH_SUMS, 0, DFSPH_SUMS * sizeof(double));
+}
+
 /* residual = source + dt D (v - D^T p / dt), and what follows from it; p is the operand's. One application of
  * A. */
 static Errors evaluate_residual(Dfsph *dfsph, const DfsphProblem *problem, const float *p) {
@@ -268,6 +282,10 @@ static Errors evaluate_residual(Dfsph *dfsph, const DfsphProblem *problem, const
     const float dt = problem->params->time_step;
     float *residual = dfsph->residual;
     EACH_BLOCK {
+        if (dfsph->still[block]) {
+            still_block(dfsph, block);
+            continue;
+        }
         divergence_block(dfsph, problem, (const Float4 *)dfsph->guess, (const double(*)[6])velocities,
                          residual, block);
         LaneSum one = {0}, two = {0};
@@ -362,9 +380,11 @@ static void prepare(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, f
         memset(dfsph->image + (size_t)block * BLOCK, 0, BLOCK * sizeof(float));
         memcpy(dfsph->operand + (size_t)block * BLOCK, problem->particles->position + (size_t)block * BLOCK,
                BLOCK * sizeof(Float4));
+        bool still = problem->held != NULL;
         for (uint32_t i = block * BLOCK; i < (block + 1) * BLOCK; i++) {
             const bool few = kind == SOLVE_DIVERGENCE && problem->rows->neighbours[i] < MIN_NEIGHBOURS;
             const bool held = problem->held != NULL && problem->held[i];
+            still = still && held;
             const bool takes_part = i < count && gradient_sum[i][3] > MIN_DIAGONAL && !few && !held;
             const float lower = kind == SOLVE_SHIFT && pressure[i] > 0.0f ? -FLT_MAX : 0.0f;
             if (kind == SOLVE_SHIFT)
@@ -375,6 +395,7 @@ static void prepare(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, f
             dfsph->operand[i][3] = p[i];
             dfsph->source[i] = source_of(problem, kind, i);
         }
+        dfsph->still[block] = still;
     }
 }
 
@@ -415,6 +436,8 @@ static GcrSums gcr_apply(Dfsph *dfsph, const DfsphProblem *problem, const float 
     dfsph->carried.count++;
     apply_transpose(dfsph, problem, NULL, 1.0f, dfsph->answer[place], dfsph->responses[place]);
     EACH_BLOCK {
+        if (dfsph->still[block])
+            continue;
         divergence_block(dfsph, problem, (const Float4 *)dfsph->answer[place],
                          (const double(*)[6])dfsph->responses[place], dfsph->new_image, block);
         LaneSum sums[5] = {0};
@@ -447,6 +470,8 @@ static double gcr_update(Dfsph *dfsph, const DfsphProblem *problem, float *p, fl
                          Errors *errors) {
     const uint32_t blocks = particles_blocks(problem->particles);
     EACH_BLOCK {
+        if (dfsph->still[block])
+            continue;
         LaneSum one = {0}, two = {0}, cut = {0};
         EACH_SLICE {
             float *r = dfsph->residual + first, *q = dfsph->image + first, *d = dfsph->direction + first;

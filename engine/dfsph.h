@@ -43,6 +43,7 @@ typedef struct Dfsph {
     double *partials;      /* [blocks][DFSPH_SUMS] */
     double (*impulses)[6]; /* [objects] sums of boundary_impulse */
     float *lower;          /* [particles] least value of the unknown in a shift; one slice of zeros else */
+    uint8_t *still;        /* [blocks] 1: all of it is held, and its vectors are zero during a solve */
     bool shifting;
     bool moving;           /* any object has a velocity or may get one */
     bool answering;        /* and bodies answer pressure */

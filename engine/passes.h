@@ -147,6 +147,7 @@ typedef uint32_t RowAllocate(void *rows, int thread, uint32_t entries);
 typedef struct SearchJob {
     const CellGrid *grid;
     const uint32_t *cell; /* cell of every particle */
+    int parts;            /* of a slab of cells, see Grid.apart; rows go to particles of the first */
     const Float4 *position;
     uint32_t count;
     Kernel kernel;

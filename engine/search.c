@@ -1,9 +1,9 @@
 /* Who is near whom: the neighbour search and the terms of walls and bodies, compiled once per instruction
  * set.
  *
- * The 27 cells around a particle are nine runs of particles; they are copied once a cell, and each of its
- * particles keeps those within a support radius. Sixteen lists become a slice's rows, with densities and sums
- * of gradients on the way. */
+ * The 27 cells around a particle are nine runs of particles (eighteen where slabs of cells have two parts);
+ * they are copied once a cell, and each of its particles keeps those within a support radius. Sixteen lists
+ * become a slice's rows, with densities and sums of gradients on the way. */
 #include "pair.h"
 
 /* ---- Neighbour search ---- */
@@ -20,8 +20,9 @@ static int gather_candidates(const SearchJob *job, uint32_t cell, Scratch *scrat
     const CellGrid *grid = job->grid;
     const int32_t column = grid->size[1], slab = grid->size[1] * grid->size[2];
     int n = 0;
-    for (int run = 0; run < 9; run++) {
-        const int64_t middle = (int64_t)cell + (run / 3 - 1) * slab + (run % 3 - 1) * column;
+    for (int run = 0; run < 9 * job->parts; run++) {
+        const int64_t slabs = (run / 3 % 3 - 1) * job->parts + run / 9;
+        const int64_t middle = (int64_t)cell + slabs * slab + (run % 3 - 1) * column;
         const uint32_t begin = grid->start[middle - 1], end = grid->start[middle + 2];
         if (n + (int64_t)(end - begin) > MAX_CANDIDATES)
             return -1;
