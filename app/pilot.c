@@ -29,6 +29,18 @@ static bool read_script(const char *path, const Scene *scene, char **text, size_
            script_parse(path, *text, *size, &words, script, err);
 }
 
+/* A file that would do nothing is a mistake. */
+static bool check_use(const Pilot *pilot, const Scene *scene, Err *err) {
+    for (int b = 0; b < scene->def.body_count; b++)
+        if (scene->def.bodies[b].drive)
+            return true;
+    for (size_t i = 0; i < pilot->script.count; i++)
+        if (pilot->script.events[i].command != SCRIPT_CAMERA)
+            return err_set(err, ERR_INPUT, "%s:%d: no body of %s has a drive: RigidBodies[].drive is missing",
+                           pilot->file, pilot->script.events[i].line, scene->file);
+    return true;
+}
+
 bool pilot_read(Pilot *pilot, const Scene *scene, const char *file, const char *folder, Err *err) {
     const ScriptWords words = words_of(scene);
     *pilot = (Pilot){.helm = helm_begin(&words)};
@@ -38,16 +50,9 @@ bool pilot_read(Pilot *pilot, const Scene *scene, const char *file, const char *
     } else {
         pilot->file = file ? file : scene->input;
     }
-    return !pilot->file || read_script(pilot->file, scene, &pilot->text, &pilot->size, &pilot->script, err);
-}
-
-/* A file that would do nothing is a mistake. */
-static bool check_use(const Pilot *pilot, const SkiffSim *sim, Err *err) {
-    for (size_t i = 0; skiff_drive_count(sim) == 0 && i < pilot->script.count; i++)
-        if (pilot->script.events[i].command != SCRIPT_CAMERA)
-            return err_set(err, ERR_INPUT, "%s:%d: no body of the scene has a drive", pilot->file,
-                           pilot->script.events[i].line);
-    return true;
+    return !pilot->file ||
+           (read_script(pilot->file, scene, &pilot->text, &pilot->size, &pilot->script, err) &&
+            check_use(pilot, scene, err));
 }
 
 static bool is_open(const Pilot *pilot, const SkiffSim *sim) {
@@ -57,7 +62,7 @@ static bool is_open(const Pilot *pilot, const SkiffSim *sim) {
 bool pilot_create(Pilot *pilot, const char *folder, const SkiffSim *sim, Err *err) {
     char path[4096];
     join(path, folder, copy_name);
-    if (!check_use(pilot, sim, err) || (pilot->text && !file_write(path, pilot->text, pilot->size, err)))
+    if (pilot->text && !file_write(path, pilot->text, pilot->size, err))
         return false;
     join(path, folder, record_name);
     return !is_open(pilot, sim) || csv_create(&pilot->record, path, record_header, err);
@@ -101,7 +106,7 @@ bool pilot_resume(Pilot *pilot, const Scene *scene, const char *folder, const Sk
     const double dt = (double)skiff_params(sim)->time_step, done = skiff_time(sim) - dt;
     if (skiff_step_count(sim) == 0)
         return pilot_create(pilot, folder, sim, err);
-    if (!check_use(pilot, sim, err) || !check_past(pilot, scene, folder, done, err))
+    if (!check_past(pilot, scene, folder, done, err))
         return false;
     join(path, folder, copy_name);
     if (pilot->text && !file_write(path, pilot->text, pilot->size, err))

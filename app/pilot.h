@@ -19,7 +19,8 @@ typedef struct Pilot {
 } Pilot;
 
 /* Reads the input: `file` (--input), or the copy that a resumed run's folder holds, or the one the scene
- * names. All problems of the file are in the message. Writes nothing. folder: NULL for a new run. */
+ * names. All problems of the file are in the message; so is that it drives and the scene has nothing to
+ * drive: a run must not fill a sea first to find that out. Writes nothing. folder: NULL for a new run. */
 bool pilot_read(Pilot *pilot, const Scene *scene, const char *file, const char *folder, Err *err);
 /* Before each step. */
 bool pilot_step(Pilot *pilot, SkiffSim *sim, Err *err);

@@ -5,6 +5,7 @@
  * without making walls, tile and existing water, as in the paper. After the last run of a row of table1 the
  * water is left to itself for a while: what a fill is for. */
 #include "carensac.h"
+#include "carried.h"
 #include "commands.h"
 #include "csv.h"
 #include "html.h"
@@ -13,6 +14,7 @@
 
 #include "engine/base/file.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -45,6 +47,23 @@ static void tell(const Reproduction *run, const char *what, const char *row, int
 
 double reproduce_radius(const CliArgs *args) {
     return isnan(args->radius) ? CARENSAC_RADIUS : args->radius;
+}
+
+Scene *reproduce_scene(const ReproduceJob *job, const char *name, double duration, const char *const *edits,
+                       int edit_count, Err *err) {
+    enum { OWN = 3, MAX = 8 };
+    static const double paper_step = 0.003; /* s */
+    const double radius = reproduce_radius(job->args);
+    char texts[OWN][64];
+    const char *all[MAX] = {texts[0], texts[1], texts[2]};
+    assert(OWN + edit_count <= MAX);
+    snprintf(texts[0], sizeof texts[0], "particleRadius=%.9g", radius);
+    snprintf(texts[1], sizeof texts[1], "timeStepSize=%.9g", paper_step * radius / CARENSAC_RADIUS);
+    snprintf(texts[2], sizeof texts[2], "duration=%.9g",
+             isnan(job->args->duration) ? duration : job->args->duration);
+    for (int k = 0; k < edit_count; k++)
+        all[OWN + k] = edits[k];
+    return carried_scene(name, all, OWN + edit_count, err);
 }
 
 void reproduce_tell(const ReproduceJob *job, const char *row, const SkiffSim *sim, double end) {

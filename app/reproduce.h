@@ -5,6 +5,7 @@
 
 #include "cli.h"
 #include "machine.h"
+#include "scene.h"
 #include "series.h"
 #include "sheet.h"
 
@@ -19,6 +20,10 @@ enum { REPRODUCE_BOAT_WINDOWS = 2 };
 
 /* --radius, or without it the paper's, m. */
 double reproduce_radius(const CliArgs *args);
+/* A carried scene with particles of that radius, steps as long for their size as the paper's, and --duration,
+ * or without it `duration` (s); then edited by `edits`. */
+Scene *reproduce_scene(const ReproduceJob *job, const char *name, double duration, const char *const *edits,
+                       int edit_count, Err *err);
 /* A line of progress on stderr, twenty times on the way to `end` (s). */
 void reproduce_tell(const ReproduceJob *job, const char *row, const SkiffSim *sim, double end);
 

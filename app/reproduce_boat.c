@@ -14,7 +14,7 @@
 static const char *const scenes[REPRODUCE_BOAT_WINDOWS] = {"boat-cylinder-5m.json",
                                                            "boat-cylinder-2.5m.json"};
 
-static const double standard_step = 0.003, standard_duration = 25;
+static const double standard_duration = 25;
 static const double start_time = 5; /* s, of the thrust */
 
 /* Columns before those of the phases. The first ones are what profile_make() looks for. */
@@ -34,19 +34,6 @@ enum {
 static const char header[] =
     "step,t,dt,particles,density_iterations,divergence_iterations,moved,step_ms,speed,"
     "bow_up_deg";
-
-static Scene *load(const ReproduceJob *job, int window, Err *err) {
-    const double radius = reproduce_radius(job->args);
-    const double duration = isnan(job->args->duration) ? standard_duration : job->args->duration;
-    char texts[3][64];
-    const char *edits[3];
-    snprintf(texts[0], sizeof texts[0], "particleRadius=%.9g", radius);
-    snprintf(texts[1], sizeof texts[1], "timeStepSize=%.9g", standard_step * radius / CARENSAC_RADIUS);
-    snprintf(texts[2], sizeof texts[2], "duration=%.9g", duration);
-    for (int k = 0; k < 3; k++)
-        edits[k] = texts[k];
-    return carried_scene(scenes[window], edits, 3, err);
-}
 
 static bool make_series(Series *series, Err *err) {
     char text[4096];
@@ -138,7 +125,7 @@ static bool sum_up(const ReproduceJob *job, int window, const SkiffSim *sim, con
 }
 
 static bool sail_window(const ReproduceJob *job, int window, Series *series, Err *err) {
-    Scene *scene = load(job, window, err);
+    Scene *scene = reproduce_scene(job, scenes[window], standard_duration, NULL, 0, err);
     SkiffSim *sim =
         scene ? carried_start(scene, job->folder, job->args->threads, (SkiffSimd)job->args->simd, err) : NULL;
     if (sim && !*job->machine->cpu)

@@ -19,7 +19,7 @@ static const char header[] = "t,closed_energy,absorbing_energy,closed_particles,
                              "closed_depth,absorbing_depth";
 static const char *const side_names[SIDE_COUNT] = {"closed end", "absorbing end"};
 
-static const double standard_step = 0.003, standard_duration = 6.6;
+static const double standard_duration = 6.6;
 static const double outflow_layer = 0.5, inflow_layer = 0.2; /* m, of the scene */
 /* Between these times (s) the closed half has its least energy, while its first wave stands at the end. The
  * wave is back ("at around 2.1 s") within `reflection_span` of that. */
@@ -28,18 +28,12 @@ static const double end_time = 5.9, end_span = 0.1; /* s; means over the span ar
 
 static Scene *load(const ReproduceJob *job, Err *err) {
     const double radius = reproduce_radius(job->args);
-    const double duration = isnan(job->args->duration) ? standard_duration : job->args->duration;
-    char texts[5][64];
-    const char *edits[5];
-    snprintf(texts[0], sizeof texts[0], "particleRadius=%.9g", radius);
-    snprintf(texts[1], sizeof texts[1], "timeStepSize=%.9g", standard_step * radius / CARENSAC_RADIUS);
-    snprintf(texts[2], sizeof texts[2], "duration=%.9g", duration);
+    char texts[2][64];
     /* the layers keep their thickness, whatever the particles' size */
-    snprintf(texts[3], sizeof texts[3], "outflowDistance=%.9g", outflow_layer / radius);
-    snprintf(texts[4], sizeof texts[4], "inflowLayer=%.9g", inflow_layer / radius);
-    for (int k = 0; k < 5; k++)
-        edits[k] = texts[k];
-    return carried_scene("wedge.json", edits, 5, err);
+    snprintf(texts[0], sizeof texts[0], "outflowDistance=%.9g", outflow_layer / radius);
+    snprintf(texts[1], sizeof texts[1], "inflowLayer=%.9g", inflow_layer / radius);
+    const char *const edits[] = {texts[0], texts[1]};
+    return reproduce_scene(job, "wedge.json", standard_duration, edits, 2, err);
 }
 
 static bool add_row(Series *series, const SkiffSim *sim, double *gauges, Err *err) {

@@ -70,7 +70,7 @@ static bool inlet_source(SkiffSim *sim, const RestFitted **source, Err *err) {
     memcpy(place.bounds.min, sim->tank.min, sizeof place.bounds.min);
     memcpy(place.bounds.max, sim->tank.max, sizeof place.bounds.max);
     *source = &sea->laid.water;
-    return water_gather(&sea->water, &place, &sea->laid, err);
+    return water_gather(&sea->water, &place, &sea->laid, sim->threads, err);
 }
 
 bool absorb_make(SkiffSim *sim, Err *err) {
@@ -83,16 +83,27 @@ bool absorb_make(SkiffSim *sim, Err *err) {
     uint32_t count = 0;
     if (!inlet_source(sim, &source, err) || !inlet_reserve(sea, source->count + source->count / 8, err))
         return false;
+    Float4 *normals = sea->inlet_normals; /* [3]: is it one? */
+#pragma omp parallel for schedule(static) num_threads(sim->threads)
     for (uint32_t i = 0; i < source->count; i++) {
         const float *p = source->position[i];
         float normal[3];
-        if (p[1] >= level || !in_region(sea, p) || shape_distance_sides(&sim->tank, p, normal) < -layer)
+        const bool is_inlet =
+            p[1] < level && in_region(sea, p) && shape_distance_sides(&sim->tank, p, normal) >= -layer;
+        normals[i][3] = is_inlet ? 1.0f : 0.0f;
+        if (!is_inlet)
             continue;
+        const float length = sqrtf(normal[0] * normal[0] + normal[2] * normal[2]);
+        normals[i][0] = length > 0.0f ? -normal[0] / length : 0.0f;
+        normals[i][2] = length > 0.0f ? -normal[2] / length : 0.0f;
+    }
+    for (uint32_t i = 0; i < source->count; i++) {
+        if (normals[i][3] == 0.0f)
+            continue;
+        const float *p = source->position[i];
         memcpy(sea->inlets[count], p, 3 * sizeof(float));
         sea->inlets[count][3] = sea->water_edge ? 0.0f : wall_density(sim, p);
-        const float length = sqrtf(normal[0] * normal[0] + normal[2] * normal[2]);
-        sea->inlet_normals[count][0] = length > 0.0f ? -normal[0] / length : 0.0f;
-        sea->inlet_normals[count][2] = length > 0.0f ? -normal[2] / length : 0.0f;
+        memmove(normals[count], normals[i], sizeof(Float4));
         memcpy(sea->inlet_pressure[count], source->pressure[i], sizeof(float[2]));
         count++;
     }
@@ -187,17 +198,10 @@ static void try_inlet(const SkiffSim *sim, uint32_t index, float flow[4]) {
 
 /* The last particle takes the place of one that goes. */
 static void remove_particle(SkiffSim *sim, uint32_t i) {
-    Particles *particles = &sim->particles;
-    const uint32_t last = --particles->count;
-    float *density = sim->rows.density.data, *pressure = sim->pressure.data;
+    const uint32_t last = sim->particles.count - 1;
+    float *density = sim->rows.density.data;
     density[i] = density[last];
-    pressure[i] = pressure[last];
-    for (int f = 0; f < PARTICLE_FIELD_COUNT; f++) {
-        char *data = particles->front[f].data;
-        const size_t size = particle_fields[f].size;
-        memcpy(data + i * size, data + last * size, size);
-        memset(data + last * size, 0, size);
-    }
+    particles_remove(&sim->particles, &i, 1, sim->pressure.data);
 }
 
 static bool let_out(SkiffSim *sim, Err *err) {

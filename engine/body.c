@@ -2,6 +2,8 @@
  * unknown (see dfsph.c), so a light body needs no substeps. Not here: collisions between bodies. */
 #include "body.h"
 
+#include "dvec.h"
+
 #include "shape.h"
 
 #include <math.h>
@@ -116,12 +118,6 @@ bool body_make(const SkiffBodyDef *def, const char *path, Body *body, Err *err) 
         return err_add(err, ERR_INPUT, "%s: no memory", path);
     }
     memcpy(body->name, def->name, length);
-    for (uint32_t v = 0; v < body->mesh.vertex_count; v++) {
-        double length_sq = 0.0;
-        for (int k = 0; k < 3; k++)
-            length_sq += (double)body->mesh.vertices[v][k] * (double)body->mesh.vertices[v][k];
-        body->reach = fmax(body->reach, sqrt(length_sq));
-    }
     body_prepare(body, -INFINITY);
     return true;
 }
@@ -134,6 +130,19 @@ void body_free(Body *body) {
 
 bool body_held(const Body *body, double time) {
     return time < body->release_time || time >= body->stop_time;
+}
+
+double body_box_distance_sq(const Body *body, const double p[3], float local[3]) {
+    double arm[3], apart_sq = 0.0;
+    dvec_sub(arm, p, body->position);
+    for (int k = 0; k < 3; k++) { /* R^T arm */
+        local[k] =
+            (float)(body->matrix[0][k] * arm[0] + body->matrix[1][k] * arm[1] + body->matrix[2][k] * arm[2]);
+        const double out =
+            fmax((double)(body->mesh.min[k] - local[k]), (double)(local[k] - body->mesh.max[k]));
+        apart_sq += out > 0.0 ? out * out : 0.0;
+    }
+    return apart_sq;
 }
 
 /* Share of a prescribed velocity in the middle of the step that begins at `time`. */

@@ -14,7 +14,6 @@ typedef struct Body {
     uint32_t free_axes;
     double release_time, stop_time, ramp_time;
     double mass, volume;  /* kg, m^3 */
-    double reach;         /* m, from the centre of mass to the farthest vertex */
     double inertia[3][3]; /* kg m^2, body axes */
     double position[3];   /* centre of mass, world */
     double rotation[4];   /* x y z w */
@@ -44,6 +43,10 @@ void body_push(Body *body, const float gravity[3], double time, double dt);
  * quaternion. */
 void body_advance(Body *body, double time, double dt);
 bool body_held(const Body *body, double time);
+
+/* p (world, m) in body axes; returns the square of its distance from the box that holds the body there. After
+ * body_prepare. */
+double body_box_distance_sq(const Body *body, const double p[3], float local[3]);
 
 void quaternion_matrix(const double q[4], double m[3][3]);
 void matrix_times(const double m[3][3], const double v[3], double result[3]);

@@ -108,7 +108,7 @@ static void total_partials(const Dfsph *dfsph, uint32_t blocks, int count, doubl
 }
 
 #define EACH_BLOCK                                                                                           \
-    _Pragma("omp parallel for schedule(static) num_threads(problem->threads)") for (uint32_t block = 0;      \
+    _Pragma("omp parallel for schedule(dynamic, 8) num_threads(problem->threads)") for (uint32_t block = 0;      \
                                                                                     block < blocks; block++)
 #define EACH_SLICE for (uint32_t first = block * BLOCK; first < (block + 1) * BLOCK; first += SLICE)
 #define EACH_LANE  _Pragma("omp simd") for (uint32_t l = 0; l < LANES; l++)
@@ -399,7 +399,8 @@ static void prepare(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, f
     }
 }
 
-/* Root mean square of the velocities without this step's gravity, in particle spacings a step. */
+/* Root mean square of the velocities without this step's gravity, in particle spacings a step. What is held
+ * has no gravity to be taken out, and would seem to fall. */
 static double water_motion(const Dfsph *dfsph, const DfsphProblem *problem) {
     const uint32_t blocks = particles_blocks(problem->particles);
     const uint32_t count = problem->particles->count;
@@ -409,7 +410,7 @@ static double water_motion(const Dfsph *dfsph, const DfsphProblem *problem) {
         double sum = 0.0;
         const uint32_t end = (block + 1) * BLOCK < count ? (block + 1) * BLOCK : count;
         for (uint32_t i = block * BLOCK; i < end; i++)
-            for (int k = 0; k < 3; k++) {
+            for (int k = 0; k < 3 && !(problem->held != NULL && problem->held[i]); k++) {
                 const float v = velocity[i][k] - dt * gravity[k];
                 sum += (double)(v * v);
             }
@@ -418,7 +419,7 @@ static double water_motion(const Dfsph *dfsph, const DfsphProblem *problem) {
     double total;
     total_partials(dfsph, blocks, 1, &total);
     const double spacing = 2.0 * (double)problem->params->particle_radius;
-    return sqrt(total / problem->particles->count) * (double)problem->params->time_step / spacing;
+    return sqrt(total / problem->evaluated_count) * (double)problem->params->time_step / spacing;
 }
 
 /* ---- Conjugate residuals ---- */

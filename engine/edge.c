@@ -95,7 +95,7 @@ void edge_advance(SkiffSim *sim, uint32_t i) {
 static bool move_water(SkiffSim *sim, const EdgePlace *place, Err *err) {
     Particles *particles = &sim->particles;
     const uint32_t n = particles->count;
-    if (!buffer_reserve(&sim->rest.source, "water that stays", (size_t)particles->capacity * sizeof(uint32_t),
+    if (!buffer_reserve(&sim->rest.source, "water that goes", (size_t)particles->capacity * sizeof(uint32_t),
                         err))
         return false;
 #pragma omp parallel for schedule(static) num_threads(sim->threads)
@@ -108,24 +108,19 @@ static bool move_water(SkiffSim *sim, const EdgePlace *place, Err *err) {
     if (!measure_distances(sim, err))
         return false;
     float *distance = sim->sea.distance_buffer.data;
-    uint32_t kept = 0, *order = sim->rest.source.data;
-    for (uint32_t i = 0; i < n; i++)
-        kept += distance[i] < place->support;
-    if (!ghosts_reserve(&sim->ghosts, n - kept, sim->time, err))
-        return false;
-    kept = 0;
+    uint32_t gone_count = 0, *gone = sim->rest.source.data;
     for (uint32_t i = 0; i < n; i++) {
-        if (distance[i] >= place->support) {
-            ghosts_add(&sim->ghosts, particles, i, sim->time);
-            continue;
-        }
-        if (distance[i] >= 0.0f && particles->edge[i] == EDGE_NONE)
+        if (distance[i] >= place->support)
+            gone[gone_count++] = i;
+        else if (distance[i] >= 0.0f && particles->edge[i] == EDGE_NONE)
             catch_particle(sim, i);
-        distance[kept] = distance[i];
-        order[kept++] = i;
     }
-    sim->stats.particles_out[SKIFF_OUT_WINDOW] += n - kept;
-    particles_permute(particles, order, kept, sim->threads);
+    if (!ghosts_reserve(&sim->ghosts, gone_count, sim->time, err))
+        return false;
+    for (uint32_t g = 0; g < gone_count; g++)
+        ghosts_add(&sim->ghosts, particles, gone[g], sim->time);
+    sim->stats.particles_out[SKIFF_OUT_WINDOW] += gone_count;
+    particles_remove(particles, gone, gone_count, distance); /* the next sort cares for the order */
     return true;
 }
 
@@ -160,21 +155,23 @@ static bool sort_rim(SkiffSim *sim, EdgePlace *place, Err *err) {
         !buffer_reserve(&sea->rim_index, "particles of the edge",
                         2 * (size_t)particles->capacity * sizeof(uint32_t), err))
         return false;
-    uint32_t *start = sea->rim_start.data, *index = sea->rim_index.data, *found = index + particles->capacity;
-    uint32_t count = 0;
-    memset(start, 0, (cells + 2) * sizeof(uint32_t));
+    uint32_t *start = sea->rim_start.data, *index = sea->rim_index.data, *cell = index + particles->capacity;
+#pragma omp parallel for schedule(static) num_threads(sim->threads)
     for (uint32_t i = 0; i < particles->count; i++) {
         const float *p = particles->position[i];
-        if (particles->edge[i] == EDGE_NONE ||
-            distance_before(place, p) < place->support - RIM * place->radius)
-            continue;
-        start[grid_cell_of(grid, p) + 2]++;
-        found[count++] = i;
+        const bool near = particles->edge[i] != EDGE_NONE &&
+                          distance_before(place, p) >= place->support - RIM * place->radius;
+        cell[i] = near ? (uint32_t)grid_cell_of(grid, p) : UINT32_MAX;
     }
+    memset(start, 0, (cells + 2) * sizeof(uint32_t));
+    for (uint32_t i = 0; i < particles->count; i++)
+        if (cell[i] != UINT32_MAX)
+            start[cell[i] + 2]++;
     for (size_t c = 0; c < cells; c++)
         start[c + 2] += start[c + 1];
-    for (uint32_t f = 0; f < count; f++)
-        index[start[grid_cell_of(grid, particles->position[found[f]]) + 1]++] = found[f];
+    for (uint32_t i = 0; i < particles->count; i++)
+        if (cell[i] != UINT32_MAX)
+            index[start[cell[i] + 1]++] = i;
     place->rim_cells.start = start;
     place->rim_index = index;
     return true;
@@ -221,25 +218,30 @@ static bool gather(SkiffSim *sim, const EdgePlace *place, Err *err) {
         part.bounds.min[k] = sim->tank.min[k] - place->support;
         part.bounds.max[k] = sim->tank.max[k] + place->support;
     }
-    return water_gather(&sim->sea.water, &part, &sim->sea.laid, err);
+    return water_gather(&sim->sea.water, &part, &sim->sea.laid, sim->threads, err);
 }
 
 /* Takes out of the list what would come too close to the edge that stayed. */
 static void drop_taken(const EdgePlace *place, RestFitted *laid) {
-    uint32_t kept = 0;
+    Float4 *position = laid->position;
+#pragma omp parallel for schedule(static) num_threads(place->sim->threads)
     for (uint32_t i = 0; i < laid->count; i++) {
-        const float *p = laid->position[i];
-        if (distance_before(place, p) < place->support + RIM * place->radius && is_taken(place, p))
-            continue;
-        memmove(laid->position[kept], p, sizeof(Float4));
-        memmove(laid->pressure[kept++], laid->pressure[i], sizeof(float[2]));
+        const float *p = position[i];
+        const bool near = distance_before(place, p) < place->support + RIM * place->radius;
+        position[i][3] = near && is_taken(place, p) ? 1.0f : 0.0f;
     }
+    uint32_t kept = 0;
+    for (uint32_t i = 0; i < laid->count; i++)
+        if (position[i][3] == 0.0f) {
+            memmove(position[kept], position[i], sizeof(Float4));
+            memmove(laid->pressure[kept++], laid->pressure[i], sizeof(float[2]));
+        }
     laid->count = kept;
 }
 
-/* What the edge's own water may touch once it is free. */
+/* Could a body be felt at p? */
 static bool body_is_near(const EdgePlace *place, const float p[3]) {
-    return sim_near_body(place->sim, p, 2.0 * (double)place->support);
+    return sim_near_body(place->sim, p, (double)place->support);
 }
 
 static RestPlace laid_place(const void *user, const float p[3]) {
@@ -248,6 +250,7 @@ static RestPlace laid_place(const void *user, const float p[3]) {
 
 void edge_mark(SkiffSim *sim, uint32_t first) {
     Particles *particles = &sim->particles;
+#pragma omp parallel for schedule(static) num_threads(sim->threads)
     for (uint32_t i = first; i < particles->count; i++)
         particles->edge[i] = edge_distance(sim, particles->position[i], NULL) < 0.0f ? EDGE_NONE : EDGE_LAID;
 }
@@ -286,8 +289,9 @@ static bool append_laid(SkiffSim *sim, Err *err) {
 static bool lay_water(SkiffSim *sim, const EdgePlace *place, Err *err) {
     const RestFitted *laid = &sim->sea.laid.water;
     bool touches = false;
-    for (uint32_t i = 0; i < laid->count && !touches; i++)
-        touches = body_is_near(place, laid->position[i]);
+#pragma omp parallel for schedule(static) num_threads(sim->threads) reduction(|| : touches)
+    for (uint32_t i = 0; i < laid->count; i++)
+        touches = touches || body_is_near(place, laid->position[i]);
     if (!touches)
         return append_laid(sim, err);
     const SkiffParams params = sim->params;

@@ -88,6 +88,26 @@ void particles_permute(Particles *particles, const uint32_t *order, uint32_t cou
     particles_bind(particles);
 }
 
+void particles_remove(Particles *particles, const uint32_t *gone, uint32_t gone_count, float *scalar) {
+    uint32_t last = particles->count, left = gone_count;
+    const uint32_t kept = last - gone_count;
+    for (uint32_t g = 0; g < gone_count && gone[g] < kept; g++) {
+        for (last--; left > 0 && gone[left - 1] == last; last--)
+            left--;
+        scalar[gone[g]] = scalar[last];
+        for (int f = 0; f < PARTICLE_FIELD_COUNT; f++) {
+            char *data = particles->front[f].data;
+            const size_t size = particle_fields[f].size;
+            memcpy(data + gone[g] * size, data + last * size, size);
+        }
+    }
+    for (int f = 0; f < PARTICLE_FIELD_COUNT; f++) {
+        const size_t size = particle_fields[f].size;
+        memset((char *)particles->front[f].data + kept * size, 0, gone_count * size);
+    }
+    particles->count = kept;
+}
+
 uint32_t particles_append(Particles *particles, const float position[3], const float velocity[3],
                           double birth) {
     assert(particles->count < particles->capacity);

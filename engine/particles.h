@@ -51,6 +51,10 @@ void *particles_data(Particles *particles, ParticleFieldId field);
  * after them. */
 void particles_permute(Particles *particles, const uint32_t *order, uint32_t count, int threads);
 
+/* Takes out the particles `gone` (ascending); the last of those that stay take their places, and take their
+ * values of `scalar` with them. Zeroes the padding after them. */
+void particles_remove(Particles *particles, const uint32_t *gone, uint32_t gone_count, float *scalar);
+
 /* Appends one particle; the capacity must hold it. Returns its index. */
 uint32_t particles_append(Particles *particles, const float position[3], const float velocity[3],
                           double birth);

@@ -30,19 +30,13 @@ float rest_clearance(const SkiffSim *sim, const float p[3], bool walls) {
         const float q[3] = {p[0], sim->tank_open && p[1] > rim ? rim : p[1], p[2]};
         clearance = -shape_distance(&sim->tank, q, NULL);
     }
+    double world[3];
+    for (int k = 0; k < 3; k++)
+        world[k] = (double)p[k] + sim->origin[k];
     for (int b = 0; b < sim->body_count; b++) {
         const Body *body = &sim->bodies[b];
-        double arm[3], apart_sq = 0.0;
         float local[3];
-        for (int k = 0; k < 3; k++)
-            arm[k] = (double)p[k] + sim->origin[k] - body->position[k];
-        for (int k = 0; k < 3; k++) { /* R^T arm */
-            local[k] = (float)(body->matrix[0][k] * arm[0] + body->matrix[1][k] * arm[1] +
-                               body->matrix[2][k] * arm[2]);
-            const double out =
-                fmax((double)(body->mesh.min[k] - local[k]), (double)(local[k] - body->mesh.max[k]));
-            apart_sq += out > 0.0 ? out * out : 0.0;
-        }
+        const double apart_sq = body_box_distance_sq(body, world, local);
         /* the bounds are a lower bound of the distance, and enough where others are nearer */
         if (apart_sq < (double)(clearance * clearance) || clearance < 0.0f)
             clearance = fminf(clearance, apart_sq > 4.0 * (double)(sim->kernel.support * sim->kernel.support)

@@ -360,16 +360,13 @@ static uint64_t hash_def(const SkiffSim *sim, const SkiffDef *def) {
 }
 
 bool sim_near_body(const SkiffSim *sim, const float p[3], double margin) {
-    for (int b = 0; b < sim->body_count; b++) {
-        double distance_sq = 0.0;
-        for (int k = 0; k < 3; k++) {
-            const double arm = (double)p[k] + sim->origin[k] - sim->bodies[b].position[k];
-            distance_sq += arm * arm;
-        }
-        const double reach = sim->bodies[b].reach + margin;
-        if (distance_sq < reach * reach)
+    double world[3];
+    float local[3];
+    for (int k = 0; k < 3; k++)
+        world[k] = (double)p[k] + sim->origin[k];
+    for (int b = 0; b < sim->body_count; b++)
+        if (body_box_distance_sq(&sim->bodies[b], world, local) < margin * margin)
             return true;
-    }
     return false;
 }
 

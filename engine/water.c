@@ -40,17 +40,22 @@ static float still_pressure(const SkiffSim *sim, float y) {
     return sim->params.gravity[1] * fminf(y, -sim->params.particle_radius) * dt * dt;
 }
 
+static bool list_reserve(WaterList *list, uint32_t capacity, Err *err) {
+    if (capacity <= list->capacity)
+        return true;
+    if (!buffer_reserve(&list->position, "water at rest", capacity * sizeof(Float4), err) ||
+        !buffer_reserve(&list->pressure, "pressure of water at rest", capacity * sizeof(float[2]), err))
+        return false;
+    list->capacity = capacity;
+    list->water.position = list->position.data;
+    list->water.pressure = list->pressure.data;
+    return true;
+}
+
 static bool list_add(WaterList *list, const float position[3], const float pressure[2], Err *err) {
     RestFitted *water = &list->water;
-    if (water->count == list->capacity) {
-        const uint32_t capacity = 4096 + 2 * list->capacity;
-        if (!buffer_reserve(&list->position, "water at rest", capacity * sizeof(Float4), err) ||
-            !buffer_reserve(&list->pressure, "pressure of water at rest", capacity * sizeof(float[2]), err))
-            return false;
-        list->capacity = capacity;
-        water->position = list->position.data;
-        water->pressure = list->pressure.data;
-    }
+    if (water->count == list->capacity && !list_reserve(list, 4096 + 2 * list->capacity, err))
+        return false;
     memcpy(water->position[water->count], position, 3 * sizeof(float));
     water->position[water->count][3] = 0.0f;
     memcpy(water->pressure[water->count++], pressure, sizeof(float[2]));
@@ -187,57 +192,115 @@ bool water_make_surface(SkiffSim *sim, RestTile *surface, Err *err) {
 
 /* ---- Looking ---- */
 
-static bool add_cell(const StillWater *water, const WaterPlace *place, const double corner[2], uint32_t cell,
-                     WaterList *list, Err *err) {
-    for (uint32_t i = water->start[cell]; i < water->start[cell + 1]; i++) {
-        const float *at = water->column.position[i];
-        const float p[3] = {(float)(corner[0] + (double)at[0]), place->surface + at[1],
-                            (float)(corner[1] + (double)at[2])};
-        if (place->outside(place->user, p) <= 0.0f && !list_add(list, p, water->column.pressure[i], err))
-            return false;
-    }
-    return true;
-}
+/* Squares of the world, as wide as cells: a row runs along z. */
+typedef struct Squares {
+    const StillWater *water;
+    const WaterPlace *place;
+    RestFitted *list;
+    int64_t first[2], last[2]; /* x, z */
+} Squares;
 
-/* All cells over one square of the world. */
-static bool add_square(const StillWater *water, const WaterPlace *place, const int64_t square[2],
-                       WaterList *list, Err *err) {
-    /* a little more than half the diagonal: points lie in their cells but for rounding */
-    const float reach = 0.87f * water->cell;
-    double corner[2];
+/* The cells over a square. */
+typedef struct Stack {
+    uint32_t cell;    /* the uppermost; the others follow */
+    double corner[2]; /* where this copy of the column begins, m */
+    float middle[2];  /* m */
+} Stack;
+
+static Stack stack_over(const Squares *squares, const int64_t square[2]) {
+    const StillWater *water = squares->water;
+    Stack stack;
     int32_t c[2];
-    float centre[3];
     for (int k = 0; k < 2; k++) {
         const int64_t turn = (int64_t)floor((double)square[k] / water->across);
         c[k] = (int32_t)(square[k] - turn * water->across);
-        corner[k] = (double)turn * water->period - place->origin[2 * k];
-        centre[2 * k] = (float)(corner[k] + ((double)c[k] + 0.5) * (double)water->cell);
+        stack.corner[k] = (double)turn * water->period - squares->place->origin[2 * k];
+        stack.middle[k] = (float)(stack.corner[k] + ((double)c[k] + 0.5) * (double)water->cell);
     }
+    stack.cell = (uint32_t)((c[0] * water->across + c[1]) * water->layers);
+    return stack;
+}
+
+/* Particles over row x: no fewer than can be wanted of it. */
+static uint32_t row_size(const Squares *squares, int64_t x) {
+    const StillWater *water = squares->water;
+    uint32_t size = 0;
+    for (int64_t z = squares->first[1]; z <= squares->last[1]; z++) {
+        const uint32_t cell = stack_over(squares, (const int64_t[2]){x, z}).cell;
+        size += water->start[cell + (uint32_t)water->layers] - water->start[cell];
+    }
+    return size;
+}
+
+static uint32_t add_cell(const Squares *squares, const double corner[2], uint32_t cell, uint32_t to) {
+    const StillWater *water = squares->water;
+    const WaterPlace *place = squares->place;
+    for (uint32_t i = water->start[cell]; i < water->start[cell + 1]; i++) {
+        const float *at = water->column.position[i];
+        const Float4 p = {(float)(corner[0] + (double)at[0]), place->surface + at[1],
+                          (float)(corner[1] + (double)at[2]), 0.0f};
+        if (place->outside(place->user, p) > 0.0f)
+            continue;
+        memcpy(squares->list->position[to], p, sizeof p);
+        memcpy(squares->list->pressure[to++], water->column.pressure[i], sizeof(float[2]));
+    }
+    return to;
+}
+
+/* All cells over one square of the world. */
+static uint32_t add_square(const Squares *squares, const int64_t square[2], uint32_t to) {
+    const StillWater *water = squares->water;
+    const WaterPlace *place = squares->place;
+    /* a little more than half the diagonal: points lie in their cells but for rounding */
+    const float reach = 0.87f * water->cell;
+    const Stack stack = stack_over(squares, square);
+    float centre[3] = {stack.middle[0], 0.0f, stack.middle[1]};
     for (int32_t layer = 0; layer < water->layers; layer++) {
         centre[1] = place->surface + water->top - ((float)layer + 0.5f) * water->cell;
         if (centre[1] + 0.5f * water->cell < place->bounds.min[1])
             break;
-        const uint32_t cell = (uint32_t)((c[0] * water->across + c[1]) * water->layers + layer);
-        if (water->start[cell] == water->start[cell + 1] || place->outside(place->user, centre) > reach)
-            continue;
-        if (!add_cell(water, place, corner, cell, list, err))
-            return false;
+        const uint32_t cell = stack.cell + (uint32_t)layer;
+        if (water->start[cell] < water->start[cell + 1] && place->outside(place->user, centre) <= reach)
+            to = add_cell(squares, stack.corner, cell, to);
     }
-    return true;
+    return to;
 }
 
-bool water_gather(const StillWater *water, const WaterPlace *place, WaterList *list, Err *err) {
-    int64_t first[2], last[2], square[2];
+/* Every row writes where it has room in any case, then the rows move together: one order for any number of
+ * threads, and no point is looked at twice. */
+bool water_gather(const StillWater *water, const WaterPlace *place, WaterList *list, int threads, Err *err) {
+    enum { MAX_ROWS = 4096 };
+    Squares squares = {water, place, &list->water, {0}, {0}};
     for (int k = 0; k < 2; k++) {
         const double cell = (double)water->cell, origin = place->origin[2 * k];
-        first[k] = (int64_t)floor(((double)place->bounds.min[2 * k] + origin) / cell);
-        last[k] = (int64_t)floor(((double)place->bounds.max[2 * k] + origin) / cell);
+        squares.first[k] = (int64_t)floor(((double)place->bounds.min[2 * k] + origin) / cell);
+        squares.last[k] = (int64_t)floor(((double)place->bounds.max[2 * k] + origin) / cell);
+    }
+    const int64_t rows = squares.last[0] - squares.first[0] + 1;
+    uint32_t begin[MAX_ROWS + 1], end[MAX_ROWS];
+    if (rows > MAX_ROWS)
+        return err_set(err, ERR_INPUT, "the window spans more than %d cells of %g m", MAX_ROWS,
+                       (double)water->cell);
+    begin[0] = 0;
+    for (int64_t row = 0; row < rows; row++)
+        begin[row + 1] = begin[row] + row_size(&squares, squares.first[0] + row);
+    /* the rows' sizes change a little from place to place */
+    if (!list_reserve(list, begin[rows] + begin[rows] / 8, err))
+        return false;
+#pragma omp parallel for schedule(dynamic, 1) num_threads(threads)
+    for (int64_t row = 0; row < rows; row++) {
+        int64_t square[2] = {squares.first[0] + row, squares.first[1]};
+        end[row] = begin[row];
+        for (; square[1] <= squares.last[1]; square[1]++)
+            end[row] = add_square(&squares, square, end[row]);
     }
     list->water.count = 0;
-    for (square[0] = first[0]; square[0] <= last[0]; square[0]++)
-        for (square[1] = first[1]; square[1] <= last[1]; square[1]++)
-            if (!add_square(water, place, square, list, err))
-                return false;
+    for (int64_t row = 0; row < rows; row++) {
+        const uint32_t to = list->water.count, count = end[row] - begin[row];
+        memmove(list->water.position[to], list->water.position[begin[row]], count * sizeof(Float4));
+        memmove(list->water.pressure[to], list->water.pressure[begin[row]], count * sizeof(float[2]));
+        list->water.count += count;
+    }
     return true;
 }
 

@@ -44,7 +44,7 @@ bool water_make(StillWater *water, struct SkiffSim *sim, float depth, Err *err);
  * was. */
 bool water_make_surface(struct SkiffSim *sim, RestTile *surface, Err *err);
 /* Replaces the list by the particles of a place, always in the same order. */
-bool water_gather(const StillWater *water, const WaterPlace *place, WaterList *list, Err *err);
+bool water_gather(const StillWater *water, const WaterPlace *place, WaterList *list, int threads, Err *err);
 void water_free(StillWater *water);
 void water_list_free(WaterList *list);
 

@@ -164,6 +164,8 @@ bool window_follow(SkiffSim *sim, Err *err) {
         return false;
     if (!next_shift(sim, place.shift))
         return true;
+    for (int b = 0; b < sim->body_count; b++) /* new water asks where they are now */
+        body_prepare(&sim->bodies[b], sim->time);
     if (sim->sea.water_edge) {
         sim->sea.moves++;
         sim->stats.moved = true;

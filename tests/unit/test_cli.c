@@ -168,6 +168,8 @@ static void usage_mistakes_exit_with_2(void **state) {
          "skiff reproduce carensac2023: expected table1, fig2, fig4c, fig5, boat or all, found \"tabel1\"\n"},
         {"reproduce carensac2023 --runs 0",
          "skiff reproduce carensac2023: --runs: expected an integer from 1 to 10000, found \"0\"\n"},
+        {"reproduce carensac2023 --radius 1",
+         "skiff reproduce carensac2023: --radius: expected a number from 0.0125 to 0.1, found \"1\"\n"},
         {"rest make tile", "skiff rest make: takes options only, \"tile\" is given\n"},
         {"rest make --edge 5", "skiff rest make: --edge: expected a number from 6 to 64, found \"5\"\n"},
         {"rest cut -o block.skiff", "skiff rest cut: the folder is missing\n"},
@@ -589,6 +591,7 @@ static void a_driven_run_replays_and_resumes(void **state) {
 
 static void input_that_cannot_be_right_is_refused(void **state) {
     (void)state;
+    char text[256];
     write_raft("raft.json", raft_drive);
     write_raft("drift.json", "");
     write_text("raft.input", raft_input);
@@ -600,7 +603,18 @@ static void input_that_cannot_be_right_is_refused(void **state) {
     expect("run raft.json -o never --input none.input", ERR_INPUT, NULL, "none.input: ");
     assert_false(exists("never"));
     expect("run drift.json -o never --input raft.input", ERR_INPUT, NULL,
-           "raft.input:1: no body of the scene has a drive");
+           "raft.input:1: no body of drift.json has a drive: RigidBodies[].drive is missing");
+    /* before the scene becomes a simulation: this one cannot, its crate's mesh is missing */
+    static const char crate[] = "}, {\"name\": \"crate\", \"geometryFile\": \"none.obj\"";
+    write_raft("unfinished.json", crate);
+    static const char *const commands[] = {"run unfinished.json -o never", "check unfinished.json",
+                                           "bench unfinished.json"};
+    for (int i = 0; i < COUNT(commands); i++)
+        expect(commands[i], ERR_INPUT, NULL, "scene.input:1: no body of unfinished.json has a drive");
+    assert_false(exists("never"));
+    snprintf(text, sizeof text, "%s%s", raft_drive, crate);
+    write_raft("unfinished.json", text);
+    expect("check unfinished.json", ERR_INPUT, NULL, "none.obj");
     /* the past cannot change, the future can */
     expect("run raft.json -o past -q --input raft.input --duration 0.06", 0, NULL, "");
     write_text("other.input", "0 press w\n0.02 heading 21\n");
