@@ -108,8 +108,9 @@ static void total_partials(const Dfsph *dfsph, uint32_t blocks, int count, doubl
 }
 
 #define EACH_BLOCK                                                                                           \
-    _Pragma("omp parallel for schedule(dynamic, 8) num_threads(problem->threads)") for (uint32_t block = 0;      \
-                                                                                    block < blocks; block++)
+    _Pragma("omp parallel for schedule(dynamic, 8) num_threads(problem->threads)") for (uint32_t block = 0;  \
+                                                                                        block < blocks;      \
+                                                                                        block++)
 #define EACH_SLICE for (uint32_t first = block * BLOCK; first < (block + 1) * BLOCK; first += SLICE)
 #define EACH_LANE  _Pragma("omp simd") for (uint32_t l = 0; l < LANES; l++)
 
@@ -592,8 +593,8 @@ static SolveLimits solve_limits(const Dfsph *dfsph, const DfsphProblem *problem,
     case SOLVE_SHIFT:
         return (SolveLimits){density, STEADY_SAFETY, params->min_iterations, params->max_iterations};
     default:
-        return (SolveLimits){density, safety(water_motion(dfsph, problem)), params->min_iterations,
-                             params->max_iterations};
+        return (SolveLimits){density, problem->settling ? safety(1.0) : safety(water_motion(dfsph, problem)),
+                             params->min_iterations, params->max_iterations};
     }
 }
 

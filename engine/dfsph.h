@@ -63,6 +63,7 @@ typedef struct DfsphProblem {
     int body_count;
     Particles *particles;
     const uint8_t *held;      /* NULL, or [particles] 1: keeps velocity and pressure, with a row or without */
+    bool settling;            /* a fill's: steps that only lead somewhere stop as a flow's do */
     uint32_t evaluated_count; /* particles that are not held: errors are means over these */
     int threads;
 } DfsphProblem;
