@@ -87,6 +87,8 @@ static bool emit_rest(SkiffSim *sim, const SkiffBlockDef *def, const char *path,
         block.bounds.max[k] = (float)((double)def->end[k] - sim->origin[k]);
         request.offset[k] = (double)def->offset[k];
     }
+    if (sim->tank_open) /* higher it would run over */
+        block.bounds.max[1] = fminf(block.bounds.max[1], sim->tank.max[1] - sim->params.particle_radius);
     request.bounds = block.bounds;
     request.surface = block.bounds.max[1];
     const uint64_t first_id = sim->particles.next_id;

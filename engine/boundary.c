@@ -344,7 +344,8 @@ bool boundary_place(Boundary *boundary, const Body *bodies, int body_count, cons
     return boundary_sort(set, cell_size, err);
 }
 
-/* One try: contacts of every block, appended to the common list. False: a particle touches too many objects.
+/* One try: contacts of every block, appended to the common list. False: a particle touches too many objects
+ * or samples.
  */
 static bool apply_blocks(Boundary *boundary, const BoundaryJob *job, const Passes *passes, Rows *rows,
                          int threads, uint32_t *fault) {
@@ -391,8 +392,11 @@ bool boundary_apply(Boundary *boundary, Rows *rows, const RowsJob *build, Err *e
                              .shape = {rows->shape[0].data, rows->shape[1].data}};
     uint32_t fault;
     if (!apply_blocks(boundary, &job, build->passes, rows, build->threads, &fault))
-        return err_set(err, ERR_DIVERGED, "particle %llu touches more than %d walls and bodies at once",
-                       (unsigned long long)particles->id[fault], MAX_CONTACT_OBJECTS);
+        return err_set(
+            err, ERR_DIVERGED,
+            "particle %llu touches more than %d walls and bodies at once, or more than %d of their "
+            "samples lie around it",
+            (unsigned long long)particles->id[fault], MAX_CONTACT_OBJECTS, MAX_NEAR_SAMPLES);
     if (boundary->contact_count <= boundary->contact_capacity)
         return true;
     /* the terms are done, only the list was too short: make room and list the contacts alone once more */
@@ -406,8 +410,8 @@ bool boundary_apply(Boundary *boundary, Rows *rows, const RowsJob *build, Err *e
     return apply_blocks(boundary, &again, build->passes, rows, build->threads, &fault);
 }
 
-void boundary_impulse(const Boundary *boundary, const float *p, uint32_t blocks, double (*totals)[6],
-                      int threads) {
+void boundary_impulse(const Boundary *boundary, const float *p, size_t stride, uint32_t blocks,
+                      double (*totals)[6], int threads) {
     const uint32_t objects = boundary->object_count;
     double(*partials)[6] = boundary->partial_buffer.data;
 #pragma omp parallel for schedule(static) num_threads(threads)
@@ -419,7 +423,7 @@ void boundary_impulse(const Boundary *boundary, const float *p, uint32_t blocks,
         memset(partial, 0, objects * sizeof *partial);
         for (uint32_t c = span.start; c < span.start + span.count; c++) {
             const Contact *contact = &boundary->contacts[c];
-            const float weight = p[contact->particle];
+            const float weight = p[contact->particle * stride];
             for (int k = 0; k < 3; k++) {
                 partial[contact->object][k] += (double)(weight * contact->g[k]);
                 partial[contact->object][3 + k] += (double)(weight * contact->t[k]);

@@ -71,9 +71,9 @@ bool boundary_place(Boundary *boundary, const Body *bodies, int body_count, cons
  * listed. */
 bool boundary_apply(Boundary *boundary, Rows *rows, const RowsJob *job, Err *err);
 /* Sum over the contacts of p_i (g, t) for every object: totals[object][6]; in order, so independent of the
- * threads. */
-void boundary_impulse(const Boundary *boundary, const float *p, uint32_t blocks, double (*totals)[6],
-                      int threads);
+ * threads. The p of neighbouring particles are `stride` floats apart. */
+void boundary_impulse(const Boundary *boundary, const float *p, size_t stride, uint32_t blocks,
+                      double (*totals)[6], int threads);
 void boundary_free(Boundary *boundary);
 
 #endif

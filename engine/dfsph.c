@@ -53,30 +53,30 @@ static const double STEADY_SAFETY = 0.4;
 
 bool dfsph_reserve(Dfsph *dfsph, uint32_t particle_capacity, uint32_t object_count, Err *err) {
     const size_t padded = particle_capacity + BLOCK, blocks = padded / BLOCK;
-    const size_t bytes = padded * (5 * sizeof(Float4) + 8 * sizeof(float)) +
-                         blocks * DFSPH_SUMS * sizeof(double) + (size_t)object_count * 12 * sizeof(double);
+    const size_t bytes = padded * ((2 + DFSPH_CARRIED) * sizeof(Float4) + 7 * sizeof(float)) +
+                         blocks * (DFSPH_SUMS * sizeof(double) + 1) +
+                         (size_t)object_count * (2 + DFSPH_CARRIED) * sizeof *dfsph->response;
     if (!buffer_reserve(&dfsph->buffer, "pressure solver", bytes, err))
         return false;
     char *next = dfsph->buffer.data;
-#define TAKE(field, count)                                                                                   \
-    dfsph->field = (void *)next;                                                                             \
-    next += (count) * sizeof *dfsph->field
+#define TAKE(field, count) (dfsph->field = (void *)next, next += (count) * sizeof *dfsph->field)
     TAKE(operand, padded);
-    TAKE(acceleration, padded);
     TAKE(guess, padded);
-    TAKE(spare[0], padded);
-    TAKE(spare[1], padded);
+    for (int k = 0; k < DFSPH_CARRIED; k++)
+        TAKE(answer[k], padded);
     TAKE(partials, blocks * DFSPH_SUMS);
     TAKE(impulses, object_count);
-    TAKE(responses, object_count);
+    TAKE(response, object_count);
+    for (int k = 0; k < DFSPH_CARRIED; k++)
+        TAKE(responses[k], object_count);
     TAKE(residual, padded);
-    TAKE(preconditioned, padded);
     TAKE(direction, padded);
     TAKE(image, padded);
     TAKE(new_image, padded);
     TAKE(inv_diagonal, padded);
     TAKE(source, padded);
     TAKE(lower, padded);
+    TAKE(still, blocks);
 #undef TAKE
     return true;
 }
@@ -135,30 +135,32 @@ static void set_operand(Dfsph *dfsph, const DfsphProblem *problem, const float *
     }
 }
 
-/* result = base + scale D^T p for the fluid, responses = D^T p for the bodies; p is the operand's. base NULL:
+/* result = base + scale D^T p for the fluid, response = D^T p for the bodies; p is the operand's. base NULL:
  * 0. */
-static void apply_transpose(Dfsph *dfsph, const DfsphProblem *problem, const float *p, const Float4 *base,
-                            float scale, Float4 *result) {
+static void apply_transpose(Dfsph *dfsph, const DfsphProblem *problem, const Float4 *base, float scale,
+                            Float4 *result, double (*response)[6]) {
     const uint32_t blocks = particles_blocks(problem->particles);
     const PairData *pairs = dfsph->pairs;
     const AccelerateJob job = {
         .operand = (const Float4 *)dfsph->operand, .base = base, .scale = scale, .result = result};
     EACH_BLOCK {
+        if (base == NULL && dfsph->still[block])
+            continue;
         problem->passes->accelerate(pairs, &job, block);
         if (problem->held != NULL)
             hold_block(problem->held, pairs, &job, block);
     }
     if (!dfsph->moving || !dfsph->answering)
         return;
-    boundary_impulse(problem->boundary, p, blocks, dfsph->impulses, problem->threads);
+    boundary_impulse(problem->boundary, &dfsph->operand[0][3], 4, blocks, dfsph->impulses, problem->threads);
     const double mass = (double)pairs->volume * (double)problem->params->rest_density;
     for (int b = 0; b < problem->body_count; b++) {
         const double *impulse = dfsph->impulses[1 + b];
-        double *response = dfsph->responses[1 + b];
-        matrix_times((const double(*)[3])problem->bodies[b].inv_inertia, impulse + 3, response + 3);
+        double *answer = response[1 + b];
+        matrix_times((const double(*)[3])problem->bodies[b].inv_inertia, impulse + 3, answer + 3);
         for (int k = 0; k < 3; k++) {
-            response[k] = -mass * problem->bodies[b].inv_mass[k] * impulse[k];
-            response[3 + k] *= -mass;
+            answer[k] = -mass * problem->bodies[b].inv_mass[k] * impulse[k];
+            answer[3 + k] *= -mass;
         }
     }
 }
@@ -186,26 +188,11 @@ static void divergence_block(const Dfsph *dfsph, const DfsphProblem *problem, co
         subtract_bodies(problem->boundary, velocities, result, block);
 }
 
-/* result = velocity - D^T p / dt for the fluid; the bodies' share stays in responses. */
-static void apply_pressure(Dfsph *dfsph, const DfsphProblem *problem, const float *p, Float4 *result) {
-    set_operand(dfsph, problem, p);
-    apply_transpose(dfsph, problem, p, (const Float4 *)problem->particles->velocity,
-                    -1.0f / problem->params->time_step, result);
-}
-
-/* The fluid's velocities after the solve. What is held is kept out by way of a copy: the passes write whole
- * blocks. */
-static void change_velocities(Dfsph *dfsph, const DfsphProblem *problem, const float *p) {
-    Float4 *velocity = problem->particles->velocity;
-    if (problem->held == NULL) {
-        apply_pressure(dfsph, problem, p, velocity);
-        return;
-    }
-    apply_pressure(dfsph, problem, p, dfsph->guess);
-#pragma omp parallel for schedule(static) num_threads(problem->threads)
-    for (uint32_t i = 0; i < problem->particles->count; i++)
-        if (!problem->held[i])
-            memcpy(velocity[i], dfsph->guess[i], sizeof(Float4));
+/* guess = velocity - D^T p / dt, p the operand's; the bodies' share stays in `response`. */
+static void apply_pressure(Dfsph *dfsph, const DfsphProblem *problem) {
+    apply_transpose(dfsph, problem, (const Float4 *)problem->particles->velocity,
+                    -1.0f / problem->params->time_step, dfsph->guess, dfsph->response);
+    dfsph->carried.count = 0;
 }
 
 /* Velocities of the bodies after the pressure so far. */
@@ -213,10 +200,37 @@ static void body_velocities(const Dfsph *dfsph, const DfsphProblem *problem, dou
     const double scale = 1.0 / (double)problem->params->time_step;
     for (int b = 0; b < problem->body_count; b++)
         for (int k = 0; k < 3; k++) {
-            velocities[1 + b][k] = problem->bodies[b].velocity[k] - scale * dfsph->responses[1 + b][k];
+            velocities[1 + b][k] = problem->bodies[b].velocity[k] - scale * dfsph->response[1 + b][k];
             velocities[1 + b][3 + k] =
-                problem->bodies[b].angular_velocity[k] - scale * dfsph->responses[1 + b][3 + k];
+                problem->bodies[b].angular_velocity[k] - scale * dfsph->response[1 + b][3 + k];
         }
+}
+
+/* The velocities that go with all of the pressure: guess and the answers since. What the projection cut off
+ * the pressure on the way is still in them, as it is in the residual, which the tolerance bounds; and bodies
+ * get what the fluid gives. (The present pressure's own answer would be one more application.) */
+static void add_answers(Dfsph *dfsph, const DfsphProblem *problem, Float4 *to) {
+    const uint32_t blocks = particles_blocks(problem->particles), count = problem->particles->count;
+    const Carried *carried = &dfsph->carried;
+    float scale[DFSPH_CARRIED];
+    for (int a = 0; a < carried->count; a++)
+        scale[a] = (float)(-carried->length[a] / (double)problem->params->time_step);
+    EACH_BLOCK {
+        for (uint32_t i = block * BLOCK; i < (block + 1) * BLOCK; i++) {
+            if (problem->held != NULL && (i >= count || problem->held[i]))
+                continue;
+            float v[4];
+            memcpy(v, dfsph->guess[i], sizeof v);
+            for (int a = 0; a < carried->count; a++)
+                for (int k = 0; k < 4; k++)
+                    v[k] += scale[a] * dfsph->answer[a][i][k];
+            memcpy(to[i], v, sizeof v);
+        }
+    }
+    for (int a = 0; dfsph->moving && a < carried->count; a++)
+        for (int b = 1; b <= problem->body_count; b++)
+            for (int k = 0; k < 6; k++)
+                dfsph->response[b][k] += carried->length[a] * dfsph->responses[a][b][k];
 }
 
 /* ---- Residuals ---- */
@@ -235,25 +249,43 @@ static inline void error_lanes(const float *residual, const float *p, const floa
     }
 }
 
-/* z, also as the operand of the next application. */
+/* z, the search direction of a particle with pressure or to get some, is the operand of the next
+ * application. */
 static inline void precondition_lanes(const float *residual, const float *p, const float *lower,
-                                      const float *inv_diagonal, float *z, Float4 *operand) {
-    EACH_LANE {
-        z[l] = p[l] > lower[l] || residual[l] > 0.0f ? residual[l] * inv_diagonal[l] : 0.0f;
-        operand[l][3] = z[l];
-    }
+                                      const float *inv_diagonal, Float4 *operand) {
+    EACH_LANE operand[l][3] = p[l] > lower[l] || residual[l] > 0.0f ? residual[l] * inv_diagonal[l] : 0.0f;
 }
 
-/* residual = source + dt D (v - D^T p / dt), and what follows from it. One application of A. */
+static inline const float *lower_of(const Dfsph *dfsph, uint32_t first) {
+    return dfsph->lower + (dfsph->shifting ? first : 0);
+}
+
+/* Held pressures act on the first evaluation only; from then on a block that is held is left out. */
+static void still_block(Dfsph *dfsph, uint32_t block) {
+    const size_t first = (size_t)block * BLOCK;
+    for (size_t i = first; i < first + BLOCK; i++)
+        dfsph->operand[i][3] = 0.0f;
+    memset(dfsph->residual + first, 0, BLOCK * sizeof(float));
+    for (int a = 0; a < DFSPH_CARRIED; a++)
+        memset(dfsph->answer[a] + first, 0, BLOCK * sizeof(Float4));
+    memset(dfsph->partials + (size_t)block * DFSPH_SUMS, 0, DFSPH_SUMS * sizeof(double));
+}
+
+/* residual = source + dt D (v - D^T p / dt), and what follows from it; p is the operand's. One application of
+ * A. */
 static Errors evaluate_residual(Dfsph *dfsph, const DfsphProblem *problem, const float *p) {
     const uint32_t blocks = particles_blocks(problem->particles);
-    apply_pressure(dfsph, problem, p, dfsph->guess);
+    apply_pressure(dfsph, problem);
     double(*velocities)[6] = dfsph->impulses; /* no longer needed */
     if (dfsph->moving)
         body_velocities(dfsph, problem, velocities);
     const float dt = problem->params->time_step;
     float *residual = dfsph->residual;
     EACH_BLOCK {
+        if (dfsph->still[block]) {
+            still_block(dfsph, block);
+            continue;
+        }
         divergence_block(dfsph, problem, (const Float4 *)dfsph->guess, (const double(*)[6])velocities,
                          residual, block);
         LaneSum one = {0}, two = {0};
@@ -263,10 +295,10 @@ static Errors evaluate_residual(Dfsph *dfsph, const DfsphProblem *problem, const
                 const float r = dfsph->source[i] + dt * residual[i];
                 residual[i] = dfsph->inv_diagonal[i] > 0.0f ? r : 0.0f;
             }
-            const float *lower = dfsph->lower + first;
+            const float *lower = lower_of(dfsph, first);
             error_lanes(residual + first, p + first, lower, &one, &two);
             precondition_lanes(residual + first, p + first, lower, dfsph->inv_diagonal + first,
-                               dfsph->preconditioned + first, dfsph->operand + first);
+                               dfsph->operand + first);
         }
         dfsph->partials[block * DFSPH_SUMS] = lane_total(&one);
         dfsph->partials[block * DFSPH_SUMS + 1] = lane_total(&two);
@@ -333,26 +365,37 @@ static float warm_start(const SkiffParams *params, SolveKind kind) {
     return kind == SOLVE_DIVERGENCE ? params->warm_start_divergence : params->warm_start;
 }
 
-/* Inverse diagonal, 0 where a particle takes no part; source; bounds; pressure scaled to the warm start. */
+/* Inverse diagonal, 0 where a particle takes no part; source; bounds; pressure scaled to the warm start, also
+ * as the operand. */
 static void prepare(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, float *p) {
     const uint32_t blocks = particles_blocks(problem->particles);
     const uint32_t count = problem->particles->count;
     const float warm = warm_start(problem->params, kind);
     const Float4 *gradient_sum = dfsph->pairs->gradient_sum;
     const float *pressure = problem->particles->pressure;
+    memset(dfsph->lower, 0, SLICE * sizeof *dfsph->lower);
     EACH_BLOCK {
+        /* other arrays may have lain here */
+        memset(dfsph->direction + (size_t)block * BLOCK, 0, BLOCK * sizeof(float));
+        memset(dfsph->image + (size_t)block * BLOCK, 0, BLOCK * sizeof(float));
+        memcpy(dfsph->operand + (size_t)block * BLOCK, problem->particles->position + (size_t)block * BLOCK,
+               BLOCK * sizeof(Float4));
+        bool still = problem->held != NULL;
         for (uint32_t i = block * BLOCK; i < (block + 1) * BLOCK; i++) {
             const bool few = kind == SOLVE_DIVERGENCE && problem->rows->neighbours[i] < MIN_NEIGHBOURS;
             const bool held = problem->held != NULL && problem->held[i];
+            still = still && held;
             const bool takes_part = i < count && gradient_sum[i][3] > MIN_DIAGONAL && !few && !held;
-            dfsph->direction[i] = dfsph->image[i] = 0.0f; /* other arrays may have lain here */
-            memcpy(dfsph->operand[i], problem->particles->position[i], sizeof(Float4));
+            const float lower = kind == SOLVE_SHIFT && pressure[i] > 0.0f ? -FLT_MAX : 0.0f;
+            if (kind == SOLVE_SHIFT)
+                dfsph->lower[i] = lower;
             dfsph->inv_diagonal[i] = takes_part ? 1.0f / gradient_sum[i][3] : 0.0f;
-            dfsph->lower[i] = kind == SOLVE_SHIFT && pressure[i] > 0.0f ? -FLT_MAX : 0.0f;
             if (!held)
-                p[i] = takes_part && p[i] > dfsph->lower[i] ? warm * p[i] : 0.0f;
+                p[i] = takes_part && p[i] > lower ? warm * p[i] : 0.0f;
+            dfsph->operand[i][3] = p[i];
             dfsph->source[i] = source_of(problem, kind, i);
         }
+        dfsph->still[block] = still;
     }
 }
 
@@ -389,16 +432,20 @@ typedef struct GcrSums {
  * active set. */
 static GcrSums gcr_apply(Dfsph *dfsph, const DfsphProblem *problem, const float *p) {
     const uint32_t blocks = particles_blocks(problem->particles);
-    apply_transpose(dfsph, problem, dfsph->preconditioned, NULL, 1.0f, dfsph->acceleration);
+    const int place = dfsph->carried.count % DFSPH_CARRIED;
+    dfsph->carried.count++;
+    apply_transpose(dfsph, problem, NULL, 1.0f, dfsph->answer[place], dfsph->responses[place]);
     EACH_BLOCK {
-        divergence_block(dfsph, problem, (const Float4 *)dfsph->acceleration,
-                         (const double(*)[6])dfsph->responses, dfsph->new_image, block);
+        if (dfsph->still[block])
+            continue;
+        divergence_block(dfsph, problem, (const Float4 *)dfsph->answer[place],
+                         (const double(*)[6])dfsph->responses[place], dfsph->new_image, block);
         LaneSum sums[5] = {0};
         EACH_SLICE {
             const float *r = dfsph->residual + first, *q = dfsph->image + first,
                         *w = dfsph->new_image + first;
             const float *inv = dfsph->inv_diagonal + first, *pressure = p + first;
-            const float *lower = dfsph->lower + first;
+            const float *lower = lower_of(dfsph, first);
             EACH_LANE {
                 const float weight = pressure[l] > lower[l] || r[l] > 0.0f ? inv[l] : 0.0f;
                 const float wq = weight * q[l], ww = weight * w[l];
@@ -423,20 +470,23 @@ static double gcr_update(Dfsph *dfsph, const DfsphProblem *problem, float *p, fl
                          Errors *errors) {
     const uint32_t blocks = particles_blocks(problem->particles);
     EACH_BLOCK {
+        if (dfsph->still[block])
+            continue;
         LaneSum one = {0}, two = {0}, cut = {0};
         EACH_SLICE {
             float *r = dfsph->residual + first, *q = dfsph->image + first, *d = dfsph->direction + first;
-            float *z = dfsph->preconditioned + first, *pressure = p + first;
+            float *pressure = p + first;
             const float *w = dfsph->new_image + first, *inv = dfsph->inv_diagonal + first;
-            const float *lower = dfsph->lower + first;
+            const float *lower = lower_of(dfsph, first);
             EACH_LANE {
-                d[l] = z[l] - beta * d[l];
+                const bool active = pressure[l] > lower[l] || r[l] > 0.0f;
+                const float z = active ? r[l] * inv[l] : 0.0f; /* the operand's fourth place */
+                d[l] = z - beta * d[l];
                 q[l] = w[l] - beta * q[l];
                 /* What has left the active set stays in the direction until that is begun anew, but must not
                  * come back by it; and what P >= 0 does not allow has not changed the particle's own
                  * residual either. Two drops that barely touch went apart at 200 m/s without this: their
                  * diagonal is tiny and their steps are huge. */
-                const bool active = pressure[l] > lower[l] || r[l] > 0.0f;
                 const float step = alpha * d[l], next = pressure[l] + step;
                 const float lost = !active ? step : next < lower[l] ? next - lower[l] : 0.0f;
                 const float correction = inv[l] > 0.0f ? lost / inv[l] : 0.0f;
@@ -445,7 +495,7 @@ static double gcr_update(Dfsph *dfsph, const DfsphProblem *problem, float *p, fl
                 r[l] = inv[l] > 0.0f ? r[l] - alpha * q[l] + correction : 0.0f;
             }
             error_lanes(r, pressure, lower, &one, &two);
-            precondition_lanes(r, pressure, lower, inv, z, dfsph->operand + first);
+            precondition_lanes(r, pressure, lower, inv, dfsph->operand + first);
         }
         dfsph->partials[block * DFSPH_SUMS] = lane_total(&one);
         dfsph->partials[block * DFSPH_SUMS + 1] = lane_total(&two);
@@ -456,6 +506,17 @@ static double gcr_update(Dfsph *dfsph, const DfsphProblem *problem, float *p, fl
     const double count = problem->evaluated_count;
     *errors = (Errors){totals[0] / count, totals[1] / count};
     return totals[2] / count;
+}
+
+/* The pressure went alpha along d = z - beta d. */
+static void carry(Carried *carried, double alpha, double beta) {
+    if (carried->count > DFSPH_CARRIED)
+        return;
+    for (int a = 0; a < carried->count; a++) {
+        const bool newest = a == carried->count - 1;
+        carried->share[a] = newest ? 1.0 : -beta * carried->share[a];
+        carried->length[a] = (newest ? 0.0 : carried->length[a]) + alpha * carried->share[a];
+    }
 }
 
 typedef struct SolveLimits {
@@ -478,11 +539,14 @@ static SolveResult solve_gcr(Dfsph *dfsph, const DfsphProblem *problem, float *p
         const double along = sums.residual_new - beta * sums.residual_old;
         const double alpha = image_sq > 0.0 ? along / image_sq : 0.0;
         has_direction = alpha > 0.0;
-        cut += gcr_update(dfsph, problem, p, (float)(has_direction ? alpha : 0.0), (float)beta, &errors);
+        const float step = has_direction ? (float)alpha : 0.0f;
+        cut += gcr_update(dfsph, problem, p, step, (float)beta, &errors);
+        carry(&dfsph->carried, (double)step, (double)(float)beta);
         if (!has_direction && beta == 0.0)
             break; /* the residual has nothing left along any direction */
         if (cut > 0.5 * tolerance && iterations < limits.max) {
             /* the projection moved P without the residual knowing */
+            set_operand(dfsph, problem, p);
             errors = evaluate_residual(dfsph, problem, p);
             iterations++;
             has_direction = false;
@@ -503,7 +567,7 @@ static SolveResult solve_jacobi(Dfsph *dfsph, const DfsphProblem *problem, float
             const uint32_t end = (block + 1) * BLOCK;
             for (uint32_t i = block * BLOCK; i < end; i++) {
                 const float next = p[i] + relaxation * dfsph->residual[i] * dfsph->inv_diagonal[i];
-                p[i] = next > 0.0f ? next : 0.0f;
+                p[i] = dfsph->operand[i][3] = next > 0.0f ? next : 0.0f;
             }
         }
         if ((errors.one_sided <= limits.tolerance && iterations >= limits.min) || iterations >= limits.max)
@@ -538,8 +602,8 @@ static void change_bodies(const Dfsph *dfsph, const DfsphProblem *problem) {
     const double scale = 1.0 / (double)problem->params->time_step;
     for (int b = 0; b < problem->body_count; b++)
         for (int k = 0; k < 3; k++) {
-            problem->bodies[b].velocity[k] -= scale * dfsph->responses[1 + b][k];
-            problem->bodies[b].angular_velocity[k] -= scale * dfsph->responses[1 + b][3 + k];
+            problem->bodies[b].velocity[k] -= scale * dfsph->response[1 + b][k];
+            problem->bodies[b].angular_velocity[k] -= scale * dfsph->response[1 + b][3 + k];
         }
 }
 
@@ -551,21 +615,26 @@ SolveResult dfsph_solve(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kin
     dfsph->pairs = kind == SOLVE_FLOW ? &problem->rows->corrected : &problem->rows->pairs;
     dfsph->moving = problem->body_count > 0 && problem->boundary->moving.samples.count != 0;
     dfsph->answering = kind != SOLVE_SHIFT;
-    if (dfsph->moving)
-        memset(dfsph->responses, 0, (1 + (size_t)problem->body_count) * sizeof *dfsph->responses);
+    dfsph->shifting = kind == SOLVE_SHIFT;
+    if (dfsph->moving) { /* bodies that do not answer */
+        const size_t bytes = (1 + (size_t)problem->body_count) * sizeof *dfsph->response;
+        memset(dfsph->response, 0, bytes);
+        for (int a = 0; a < DFSPH_CARRIED; a++)
+            memset(dfsph->responses[a], 0, bytes);
+    }
     prepare(dfsph, problem, kind, p);
     const SolveLimits limits = solve_limits(dfsph, problem, kind);
-    const SolveResult result = problem->params->pressure_solver == SKIFF_SOLVER_JACOBI
-                                   ? solve_jacobi(dfsph, problem, p, limits)
-                                   : solve_gcr(dfsph, problem, p, limits);
+    const bool jacobi = problem->params->pressure_solver == SKIFF_SOLVER_JACOBI;
+    const SolveResult result =
+        jacobi ? solve_jacobi(dfsph, problem, p, limits) : solve_gcr(dfsph, problem, p, limits);
     if (kind == SOLVE_DENSITY || kind == SOLVE_SHIFT)
         predict_density(dfsph, problem);
-    if (kind == SOLVE_SHIFT) {
-        apply_pressure(dfsph, problem, p, dfsph->guess);
-        return result;
+    if (jacobi || dfsph->carried.count > DFSPH_CARRIED) {
+        set_operand(dfsph, problem, p);
+        apply_pressure(dfsph, problem);
     }
-    change_velocities(dfsph, problem, p);
-    if (dfsph->moving)
+    add_answers(dfsph, problem, kind == SOLVE_SHIFT ? dfsph->guess : problem->particles->velocity);
+    if (dfsph->moving && kind != SOLVE_SHIFT)
         change_bodies(dfsph, problem);
     return result;
 }

@@ -94,7 +94,8 @@ static bool grid_reserve(Grid *grid, const Particles *particles, size_t cells, i
 static void counting_sort(Grid *grid, const Particles *particles, const GridBounds *domain, bool check,
                           int parts) {
     const CellGrid *cells = &grid->cells;
-    const uint32_t cell_count = (uint32_t)(cells->size[0] * cells->size[1] * cells->size[2]);
+    const uint32_t slab = (uint32_t)(cells->size[1] * cells->size[2]), slabs = (uint32_t)grid_parts(grid);
+    const uint32_t cell_count = (uint32_t)cells->size[0] * slabs * slab;
     uint32_t *unsorted = grid->unsorted_buffer.data, *histograms = grid->histogram_buffer.data;
     uint32_t *start = grid->start_buffer.data;
     const uint32_t n = particles->count;
@@ -108,6 +109,8 @@ static void counting_sort(Grid *grid, const Particles *particles, const GridBoun
             for (uint32_t i = (uint32_t)((uint64_t)n * part / parts); i < end; i++) {
                 const float *p = particles->position[i];
                 unsorted[i] = check && !inside(p, domain) ? cell_count : grid_cell_of(cells, p);
+                if (grid->apart != NULL && unsorted[i] < cell_count)
+                    unsorted[i] += (unsorted[i] / slab + grid->apart[i]) * slab;
                 histogram[unsorted[i]]++;
             }
         }
@@ -166,8 +169,8 @@ bool grid_sort(Grid *grid, Particles *particles, float cell_size, const GridBoun
     if (!grid_layout(&grid->cells, &bounds, cell_size, 1))
         return err_set(err, ERR_DIVERGED, "the fluid spreads over more than %d cells of %g m", GRID_MAX_CELLS,
                        (double)cell_size);
-    const size_t cells =
-        (size_t)grid->cells.size[0] * (size_t)grid->cells.size[1] * (size_t)grid->cells.size[2];
+    const size_t cells = (size_t)grid->cells.size[0] * (size_t)grid_parts(grid) *
+                         (size_t)grid->cells.size[1] * (size_t)grid->cells.size[2];
     const int parts = threads < MAX_PARTS ? threads : MAX_PARTS;
     if (!grid_reserve(grid, particles, cells, parts, err))
         return false;

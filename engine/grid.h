@@ -6,7 +6,10 @@
 
 typedef struct Grid {
     CellGrid cells;
-    uint32_t *cell;  /* [particles] cell of every particle, after the sort */
+    /* NULL, or before the sort [particles] 1: is sorted into a second part of its slab of cells, so that
+     * the others, which get rows, fill their slices */
+    const uint8_t *apart;
+    uint32_t *cell;  /* [particles] cell of every particle, after the sort; with `apart` of 2 parts a slab */
     uint32_t *order; /* [particles] scratch: the permutation */
     Buffer start_buffer, cell_buffer, order_buffer, unsorted_buffer, histogram_buffer;
 } Grid;
@@ -31,6 +34,11 @@ bool grid_layout(CellGrid *cells, const GridBounds *bounds, float cell_size, int
 /* m */
 static inline float grid_centre(const CellGrid *cells, int axis) {
     return cells->origin[axis] + 0.5f * (float)cells->size[axis] / cells->inv_size;
+}
+
+/* Parts of a slab: cell (x, y, z) of part k is cell (parts x + k, y, z) of the table of starts. */
+static inline int grid_parts(const Grid *grid) {
+    return grid->apart != NULL ? 2 : 1;
 }
 
 static inline uint32_t grid_cell_of(const CellGrid *cells, const float *p) {

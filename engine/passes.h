@@ -17,9 +17,10 @@ enum {
     SLICE = LANES,     /* particles a slice */
     BLOCK_SLICES = 64, /* slices a block */
     BLOCK = SLICE * BLOCK_SLICES,
-    MAX_NEIGHBOURS = 496,   /* fluid neighbours a particle may have; at rest it has 34 */
-    MAX_CANDIDATES = 8192,  /* particles in the 27 cells around one */
-    MAX_CONTACT_OBJECTS = 8 /* walls and bodies that may touch one particle */
+    MAX_NEIGHBOURS = 496,    /* fluid neighbours a particle may have; at rest it has 34 */
+    MAX_CANDIDATES = 8192,   /* particles in the 27 cells around one */
+    MAX_NEAR_SAMPLES = 4096, /* of walls, or of bodies, within a support radius of one cell */
+    MAX_CONTACT_OBJECTS = 8  /* walls and bodies that may touch one particle */
 };
 
 /* One k-th neighbour for each of a slice's sixteen particles, one cache line: the neighbour as offset from
@@ -76,12 +77,22 @@ typedef struct SampleSet {
     uint32_t count;
 } SampleSet;
 
+/* Samples near one cell. */
+typedef struct NearSamples {
+    int32_t cell; /* -1: none yet */
+    int count;
+    float x[MAX_NEAR_SAMPLES + LANES], y[MAX_NEAR_SAMPLES + LANES], z[MAX_NEAR_SAMPLES + LANES];
+    float volume[MAX_NEAR_SAMPLES + LANES];
+    int32_t object[MAX_NEAR_SAMPLES + LANES];
+} NearSamples;
+
 /* Scratch of one thread; too large for the stack. */
 typedef struct Scratch {
     float x[MAX_CANDIDATES + LANES], y[MAX_CANDIDATES + LANES], z[MAX_CANDIDATES + LANES];
     int32_t halves[MAX_CANDIDATES + LANES]; /* places of the candidates as vf_gather4_i32 takes them */
     int32_t list[SLICE][MAX_NEIGHBOURS + LANES];
     int32_t far[MAX_NEIGHBOURS + LANES];
+    NearSamples near[2]; /* walls, bodies */
     Contact contacts[BLOCK * MAX_CONTACT_OBJECTS];
 } Scratch;
 
@@ -136,6 +147,7 @@ typedef uint32_t RowAllocate(void *rows, int thread, uint32_t entries);
 typedef struct SearchJob {
     const CellGrid *grid;
     const uint32_t *cell; /* cell of every particle */
+    int parts;            /* of a slab of cells, see Grid.apart; rows go to particles of the first */
     const Float4 *position;
     uint32_t count;
     Kernel kernel;

@@ -25,10 +25,10 @@
 static const double FIRST_ALPHA = 0.8, LAST_ALPHA = 0.1;
 /* Longest step, r / sqrt(p / rho0): beyond 1.5 it is unstable, whatever depth and radius. */
 static const float LONGEST = 1.35f;
-/* The solves of moving water stop at 0.6 of a tolerance. In a layer that is let go only after more steps, or
- * as the paper does it, the tolerance itself is enough; whatever the last steps leave moves the first free
- * ones. */
-static const float LAYER_ERRORS = 1.6f, LAST_ERRORS = 0.5f;
+/* The solves of moving water stop when the two-sided error is 0.6 of a tolerance. In a layer that is let go
+ * only after more steps, or as the paper does it, the one-sided error, half of that, may be all of the
+ * tolerance, as the paper's; whatever the last steps leave moves the first free ones. */
+static const float LAYER_ERRORS = 3.3f, LAST_ERRORS = 0.5f;
 /* Of a density error of held water, the share that a step turns into pressure: with 1 its pressures swing. */
 static const float HELD_SHARE = 0.15f;
 /* Of what two particles lack to the distance of a radius, the share that each moves a step. */
@@ -105,19 +105,29 @@ static Settle settle_all(SkiffSim *sim, float surface, uint32_t active) {
                     .surface = surface};
 }
 
-bool rest_search(SkiffSim *sim, uint32_t evaluated, Err *err) {
+/* By kind: who gets no row, and who does not move. */
+static void mark_kinds(SkiffSim *sim, uint32_t evaluated) {
     RestCloud *cloud = &sim->rest;
-    Particles *points = &cloud->points;
-    Settle settle = settle_cloud(sim);
-    if (!settle_sort(&settle, err))
-        return false;
+    const Particles *points = &cloud->points;
     uint8_t *frozen = cloud->frozen.data, *held = cloud->held.data;
     const uint32_t padded = particles_blocks(points) * BLOCK;
+#pragma omp parallel for schedule(static) num_threads(sim->threads)
     for (uint32_t i = 0; i < padded; i++) {
         const RestKind kind = rest_kind(points->id[i]);
         frozen[i] = i >= points->count || !(evaluated & 1u << kind);
         held[i] = kind != REST_ACTIVE;
     }
+}
+
+bool rest_search(SkiffSim *sim, uint32_t evaluated, Err *err) {
+    RestCloud *cloud = &sim->rest;
+    Particles *points = &cloud->points;
+    Settle settle = settle_cloud(sim);
+    mark_kinds(sim, evaluated);
+    cloud->grid.apart = cloud->frozen.data;
+    if (!settle_sort(&settle, err))
+        return false;
+    mark_kinds(sim, evaluated);
     /* the samples are the simulation's, the contacts the cloud's own */
     cloud->boundary.fixed = sim->boundary.fixed;
     cloud->boundary.moving = sim->boundary.moving;

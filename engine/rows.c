@@ -73,6 +73,7 @@ bool rows_build(Rows *rows, const RowsJob *build, Err *err) {
         rows->neighbours = rows->neighbour_counts.data;
         const SearchJob job = {.grid = &build->grid->cells,
                                .cell = build->grid->cell,
+                               .parts = grid_parts(build->grid),
                                .position = (const Float4 *)particles->position,
                                .count = particles->count,
                                .kernel = *build->kernel,

@@ -1,9 +1,9 @@
 /* Who is near whom: the neighbour search and the terms of walls and bodies, compiled once per instruction
  * set.
  *
- * The 27 cells around a particle are nine runs of particles; they are copied once a cell, and each of its
- * particles keeps those within a support radius. Sixteen lists become a slice's rows, with densities and sums
- * of gradients on the way. */
+ * The 27 cells around a particle are nine runs of particles (eighteen where slabs of cells have two parts);
+ * they are copied once a cell, and each of its particles keeps those within a support radius. Sixteen lists
+ * become a slice's rows, with densities and sums of gradients on the way. */
 #include "pair.h"
 
 /* ---- Neighbour search ---- */
@@ -20,8 +20,9 @@ static int gather_candidates(const SearchJob *job, uint32_t cell, Scratch *scrat
     const CellGrid *grid = job->grid;
     const int32_t column = grid->size[1], slab = grid->size[1] * grid->size[2];
     int n = 0;
-    for (int run = 0; run < 9; run++) {
-        const int64_t middle = (int64_t)cell + (run / 3 - 1) * slab + (run % 3 - 1) * column;
+    for (int run = 0; run < 9 * job->parts; run++) {
+        const int64_t slabs = (run / 3 % 3 - 1) * job->parts + run / 9;
+        const int64_t middle = (int64_t)cell + slabs * slab + (run % 3 - 1) * column;
         const uint32_t begin = grid->start[middle - 1], end = grid->start[middle + 2];
         if (n + (int64_t)(end - begin) > MAX_CANDIDATES)
             return -1;
@@ -197,7 +198,7 @@ int PASSES_NAME(search_)(const SearchJob *job, uint32_t block, int thread, Scrat
 typedef struct ContactSum {
     int32_t object;
     int count;
-    Vf weight, g[3], t[3], m[6]; /* m: xx, yy, zz, xy, xz, yz of -sum psi_b grad W_ib (x_i - x_b)^T */
+    Vf weight, g[3], m[6]; /* m: xx, yy, zz, xy, xz, yz of -sum psi_b grad W_ib (x_i - x_b)^T */
 } ContactSum;
 
 typedef struct ContactSums {
@@ -216,51 +217,87 @@ static ContactSum *contact_sum_of(ContactSums *sums, int32_t object) {
     sum->count = 0;
     sum->weight = vf_zero();
     for (int k = 0; k < 3; k++)
-        sum->g[k] = sum->t[k] = sum->m[k] = sum->m[3 + k] = vf_zero();
+        sum->g[k] = sum->m[k] = sum->m[3 + k] = vf_zero();
     return sum;
 }
 
-/* Adds up to sixteen samples beginning at s; near: lanes in reach. */
-static bool contact_add(const BoundaryJob *job, const SampleSet *set, uint32_t s, Vm near, const Vf d[3],
-                        ContactSums *sums) {
-    const Vf volume = vf_load(set->volume + s);
-    const Vf position[3] = {vf_load(set->x + s), vf_load(set->y + s), vf_load(set->z + s)};
-    const Vi object = vi_load(set->object + s);
-    const Vf distance_sq = vf_fma(d[0], d[0], vf_fma(d[1], d[1], vf_mul(d[2], d[2])));
+/* Adds up to sixteen samples beginning at s; in_reach: their lanes. */
+static bool contact_add(const BoundaryJob *job, const NearSamples *near, int s, Vm in_reach, const Vf d[3],
+                        Vf distance_sq, ContactSums *sums) {
+    const bool shaped = job->shape[0] != NULL;
+    const Vf volume = vf_load(near->volume + s);
+    const Vi object = vi_load(near->object + s);
     Vf factor, weight;
     pair_kernel(&job->kernel, distance_sq, &factor, &weight);
     factor = vf_mul(vf_mul(factor, vf_set(-job->kernel.gradient_scale * job->kernel.inv_support)), volume);
     weight = vf_mul(weight, volume);
-    uint32_t left = near;
+    uint32_t left = in_reach;
     while (left != 0) {
-        const int32_t id = set->object[s + (uint32_t)__builtin_ctz(left)];
+        const int32_t id = near->object[s + __builtin_ctz(left)];
         const Vm mine = (Vm)(left & vi_equal(object, vi_set(id)));
         left &= ~(uint32_t)mine;
         ContactSum *sum = contact_sum_of(sums, id);
         if (sum == NULL)
             return false;
-        Vf g[3], arm[3];
+        Vf g[3];
         for (int k = 0; k < 3; k++) {
             g[k] = vf_mask(mine, vf_mul(factor, d[k]));
-            arm[k] = vf_sub(position[k], vf_set(job->centres[id][k]));
             sum->g[k] = vf_add(sum->g[k], g[k]);
         }
-        for (int k = 0; k < 3; k++) {
-            const int a = (k + 1) % 3, b = (k + 2) % 3;
-            sum->t[k] = vf_fma(arm[a], g[b], vf_fnma(arm[b], g[a], sum->t[k]));
+        for (int k = 0; shaped && k < 3; k++) {
             sum->m[k] = vf_fnma(g[k], d[k], sum->m[k]);
+            sum->m[3 + k] = vf_fnma(g[k == 2], d[k == 0 ? 1 : 2], sum->m[3 + k]);
         }
-        sum->m[3] = vf_fnma(g[0], d[1], sum->m[3]);
-        sum->m[4] = vf_fnma(g[0], d[2], sum->m[4]);
-        sum->m[5] = vf_fnma(g[1], d[2], sum->m[5]);
         sum->weight = vf_add(sum->weight, vf_mask(mine, weight));
         sum->count += __builtin_popcount(mine);
     }
     return true;
 }
 
+/* How far coordinates are outside [low, high]. */
+static inline Vf beyond(Vf x, float low, float high) {
+    const Vf below = vf_sub(vf_set(low), x), above = vf_sub(x, vf_set(high)), zero = vf_zero();
+    const Vf out = vf_select(vf_less(below, above), above, below);
+    return vf_select(vf_less(out, zero), zero, out);
+}
+
+/* Copies together the samples within a support radius of a cell. False: there are too many. */
+static bool gather_samples(const BoundaryJob *job, const SampleSet *set, const int32_t c[3],
+                           NearSamples *near) {
+    const CellGrid *grid = &set->grid;
+    const int32_t column = grid->size[1], slab = grid->size[1] * grid->size[2];
+    const float limit = job->kernel.support * job->kernel.support * 1.001f, edge = 1.0f / grid->inv_size;
+    float low[3];
+    for (int k = 0; k < 3; k++)
+        low[k] = grid->origin[k] + edge * (float)c[k];
+    near->cell = cell_grid_index(grid, c[0], c[1], c[2]);
+    near->count = 0;
+    for (int run = 0; run < 9; run++) {
+        const int32_t middle = near->cell + (run / 3 - 1) * slab + (run % 3 - 1) * column;
+        const uint32_t end = grid->start[middle + 2];
+        for (uint32_t s = grid->start[middle - 1]; s < end; s += LANES) {
+            const Vf d[3] = {beyond(vf_load(set->x + s), low[0], low[0] + edge),
+                             beyond(vf_load(set->y + s), low[1], low[1] + edge),
+                             beyond(vf_load(set->z + s), low[2], low[2] + edge)};
+            const Vf distance_sq = vf_fma(d[0], d[0], vf_fma(d[1], d[1], vf_mul(d[2], d[2])));
+            const uint32_t valid = end - s >= LANES ? 0xffffu : (1u << (end - s)) - 1u;
+            const Vm mine = (Vm)(vf_less(distance_sq, vf_set(limit)) & valid);
+            const int to = near->count;
+            if (to + __builtin_popcount(mine) > MAX_NEAR_SAMPLES)
+                return false;
+            vf_compress(near->x + to, set->x + s, mine);
+            vf_compress(near->y + to, set->y + s, mine);
+            vf_compress(near->z + to, set->z + s, mine);
+            vf_compress(near->volume + to, set->volume + s, mine);
+            near->count += vi_compress(near->object + to, set->object + s, mine);
+        }
+    }
+    vf_store(near->x + near->count, vf_set(1e18f)); /* the last lanes are near nothing */
+    return true;
+}
+
 static bool contacts_of_particle(const BoundaryJob *job, const SampleSet *set, const float *p,
-                                 ContactSums *sums) {
+                                 NearSamples *near, ContactSums *sums) {
     int32_t c[3];
     for (int k = 0; k < 3; k++) {
         c[k] = (int32_t)floorf((p[k] - set->grid.origin[k]) * set->grid.inv_size);
@@ -270,27 +307,36 @@ static bool contacts_of_particle(const BoundaryJob *job, const SampleSet *set, c
     const int32_t cell = cell_grid_index(&set->grid, c[0], c[1], c[2]);
     if (!set->occupied[cell])
         return true;
+    if (near->cell != cell && !gather_samples(job, set, c, near))
+        return false;
     const Vf limit = vf_set(job->kernel.support * job->kernel.support);
-    const int32_t column = set->grid.size[1], slab = set->grid.size[1] * set->grid.size[2];
-    for (int run = 0; run < 9; run++) {
-        const int32_t middle = cell + (run / 3 - 1) * slab + (run % 3 - 1) * column;
-        const uint32_t end = set->grid.start[middle + 2];
-        for (uint32_t s = set->grid.start[middle - 1]; s < end; s += LANES) {
-            const Vf d[3] = {vf_sub(vf_set(p[0]), vf_load(set->x + s)),
-                             vf_sub(vf_set(p[1]), vf_load(set->y + s)),
-                             vf_sub(vf_set(p[2]), vf_load(set->z + s))};
-            const Vf distance_sq = vf_fma(d[0], d[0], vf_fma(d[1], d[1], vf_mul(d[2], d[2])));
-            const uint32_t valid = end - s >= LANES ? 0xffffu : (1u << (end - s)) - 1u;
-            const Vm near = (Vm)(vf_less(distance_sq, limit) & valid);
-            if (near != 0 && !contact_add(job, set, s, near, d, sums))
-                return false;
-        }
+    for (int s = 0; s < near->count; s += LANES) {
+        const Vf d[3] = {vf_sub(vf_set(p[0]), vf_load(near->x + s)),
+                         vf_sub(vf_set(p[1]), vf_load(near->y + s)),
+                         vf_sub(vf_set(p[2]), vf_load(near->z + s))};
+        const Vf distance_sq = vf_fma(d[0], d[0], vf_fma(d[1], d[1], vf_mul(d[2], d[2])));
+        const Vm in_reach = vf_less(distance_sq, limit);
+        if (in_reach != 0 && !contact_add(job, near, s, in_reach, d, distance_sq, sums))
+            return false;
     }
     return true;
 }
 
+/* Samples push along the line to the particle, so their moments about the object's centre are the sum's at
+ * the particle. */
+static void turn_of_push(const BoundaryJob *job, Contact *contact) {
+    float arm[3];
+    for (int k = 0; k < 3; k++)
+        arm[k] = job->position[contact->particle][k] - job->centres[contact->object][k];
+    for (int k = 0; k < 3; k++) {
+        const int a = (k + 1) % 3, b = (k + 2) % 3;
+        contact->t[k] = arm[a] * contact->g[b] - arm[b] * contact->g[a];
+    }
+}
+
 int PASSES_NAME(boundary_)(const BoundaryJob *job, uint32_t block, Scratch *scratch, uint32_t *fault) {
     int contact_count = 0;
+    scratch->near[0].cell = scratch->near[1].cell = -1;
     const uint32_t begin = block * BLOCK, end = begin + BLOCK < job->count ? begin + BLOCK : job->count;
     for (uint32_t i = begin; i < end; i++) {
         const bool shaped = job->density != NULL && job->shape[0] != NULL;
@@ -302,7 +348,7 @@ int PASSES_NAME(boundary_)(const BoundaryJob *job, uint32_t block, Scratch *scra
         sums.count = 0;
         for (int k = 0; k < 2; k++) {
             if (job->sets[k]->count != 0 &&
-                !contacts_of_particle(job, job->sets[k], job->position[i], &sums)) {
+                !contacts_of_particle(job, job->sets[k], job->position[i], &scratch->near[k], &sums)) {
                 *fault = i;
                 return -1;
             }
@@ -318,9 +364,9 @@ int PASSES_NAME(boundary_)(const BoundaryJob *job, uint32_t block, Scratch *scra
             contact->object = (uint32_t)sum->object;
             for (int a = 0; a < 3; a++) {
                 contact->g[a] = vf_sum(sum->g[a]);
-                contact->t[a] = vf_sum(sum->t[a]);
                 g[a] += contact->g[a];
             }
+            turn_of_push(job, contact);
             contact->weight = vf_sum(sum->weight);
             if (job->density == NULL)
                 continue;

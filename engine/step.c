@@ -130,7 +130,7 @@ static void measure_forces(SkiffSim *sim) {
     const float *total = sim->pressure.data;
     const Particles *particles = &sim->particles;
     double(*forces)[6] = sim->object_forces.data;
-    boundary_impulse(&sim->boundary, total, particles_blocks(particles), forces, sim->threads);
+    boundary_impulse(&sim->boundary, total, 1, particles_blocks(particles), forces, sim->threads);
     for (uint32_t o = 0; o < sim->boundary.object_count; o++)
         for (int k = 0; k < 6; k++)
             forces[o][k] *= (double)sim->volume; /* p V grad W */

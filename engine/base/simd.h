@@ -191,11 +191,15 @@ static inline float vf_sum(Vf a) {
     q = _mm_add_ps(q, _mm_movehl_ps(q, q));
     return _mm_cvtss_f32(_mm_add_ss(q, _mm_movehdup_ps(q)));
 }
-/* Appends ids[lane] to out for every set lane, in lane order; may write up to 16 places; returns how many
- * count. */
+/* Appends ids[lane] (x[lane]) to out for every set lane, in lane order; may write up to 16 places; returns
+ * how many count. */
 static inline int vi_compress(int32_t *out, const int32_t *ids, Vm m) {
     /* compress in the register, then store: compressing to memory is microcoded on Zen 4 */
     _mm512_storeu_si512(out, _mm512_maskz_compress_epi32(m, _mm512_loadu_si512(ids)));
+    return __builtin_popcount(m);
+}
+static inline int vf_compress(float *out, const float *x, Vm m) {
+    _mm512_storeu_ps(out, _mm512_maskz_compress_ps(m, _mm512_loadu_ps(x)));
     return __builtin_popcount(m);
 }
 
@@ -368,6 +372,12 @@ static inline int vi_compress(int32_t *out, const int32_t *ids, Vm m) {
         out[n++] = ids[__builtin_ctz(m)];
     return n;
 }
+static inline int vf_compress(float *out, const float *x, Vm m) {
+    int n = 0;
+    for (; m != 0; m &= m - 1)
+        out[n++] = x[__builtin_ctz(m)];
+    return n;
+}
 
 #else
 
@@ -530,6 +540,12 @@ static inline int vi_compress(int32_t *out, const int32_t *ids, Vm m) {
     int n = 0;
     for (; m != 0; m &= m - 1)
         out[n++] = ids[__builtin_ctz(m)];
+    return n;
+}
+static inline int vf_compress(float *out, const float *x, Vm m) {
+    int n = 0;
+    for (; m != 0; m &= m - 1)
+        out[n++] = x[__builtin_ctz(m)];
     return n;
 }
 #undef EACH_LANE

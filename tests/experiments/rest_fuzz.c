@@ -93,6 +93,7 @@ static void fill_one(Experiment *experiment, Totals *totals, int fill) {
     def.threads = experiment->threads;
     def.params.particle_radius = R;
     def.tank.geometry = random_geometry(&dice, 24.0f, 56.0f);
+    def.tank.open = false;
     block.fill = SKIFF_FILL_REST;
     const float level = R * roll(&dice, -6.0f, 40.0f);
     for (int k = 0; k < 3; k++) {

@@ -63,8 +63,9 @@ static int simulate(const Experiment *experiment) {
     def.bodies = &body;
     def.body_count = 1;
     def.block_count = 1;
-    /* what the experiment gives is the depth, so the depth is met: a gap and 20 layers reach 51.5 mm */
-    const SkiffBlockDef block = experiment_block(&def, 58, 20, 54);
+    /* what the experiment gives is the depth, so the depth is met: a gap and 21 layers reach 52.6 mm, and they
+     * fill the tank from wall to wall */
+    const SkiffBlockDef block = experiment_block(&def, 60, 21, 56);
     def.blocks = &block;
     SkiffSim *sim = experiment_create(&def);
     printf("%u particles, surface at %.1f mm\n", skiff_particles(sim).count, 1e3 * (double)block.end[1]);
