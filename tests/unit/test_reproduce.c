@@ -292,6 +292,15 @@ static void carried_scenes_are_the_files(void **state) {
         assert_memory_equal(&carried->def.params, &file->def.params, sizeof file->def.params);
         assert_string_equal(carried->title, file->title);
         scene_free(carried);
+        /* with all the meshes that it names */
+        static const char *const coarse[] = {"particleRadius=0.1", "timeStepSize=0.012"};
+        carried = carried_scene(names[k], coarse, 2, &err);
+        SkiffSim *sim = carried ? carried_start(carried, folder, 1, SKIFF_SIMD_AUTO, &err) : NULL;
+        if (!sim)
+            fail_msg("%s", err.message);
+        assert_true(skiff_particles(sim).count > 1000);
+        skiff_destroy(sim);
+        scene_free(carried);
         scene_free(file);
     }
 }
