@@ -228,7 +228,9 @@ void sheet_write_html(FILE *out, const Sheet *sheet) {
     fprintf(out, "</h2>\n<p class=\"soft\">%s",
             most_runs > 1 ? "Medians, quartiles below; paper: " : "Paper: ");
     svg_text(out, sheet->source);
-    fputs("</p>\n<div class=\"wide\"><table><tr><th></th>", out);
+    /* many columns: smaller, and the rows' names stay where a narrow window scrolls */
+    fprintf(out, "</p>\n<div class=\"wide\"><table%s><tr><th></th>",
+            sheet->column_count > 8 ? " class=\"dense\"" : "");
     for (int c = 0; c < sheet->column_count; c++) {
         fputs("<th>", out);
         svg_text(out, sheet->columns[c].label);
@@ -246,7 +248,7 @@ void sheet_write_html(FILE *out, const Sheet *sheet) {
             write_cell(out, "<td>", figure.median, decimals);
             if (row->run_count > 1 && !isnan(figure.low)) {
                 write_cell(out, "<br><small>", figure.low, decimals);
-                write_cell(out, " to ", figure.high, decimals);
+                write_cell(out, " \u2013 ", figure.high, decimals);
                 fputs("</small>", out);
             }
             fputs("</td>", out);

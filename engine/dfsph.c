@@ -108,7 +108,7 @@ static void total_partials(const Dfsph *dfsph, uint32_t blocks, int count, doubl
 }
 
 #define EACH_BLOCK                                                                                           \
-    _Pragma("omp parallel for schedule(static) num_threads(problem->threads)") for (uint32_t block = 0;      \
+    _Pragma("omp parallel for schedule(dynamic, 8) num_threads(problem->threads)") for (uint32_t block = 0;      \
                                                                                     block < blocks; block++)
 #define EACH_SLICE for (uint32_t first = block * BLOCK; first < (block + 1) * BLOCK; first += SLICE)
 #define EACH_LANE  _Pragma("omp simd") for (uint32_t l = 0; l < LANES; l++)

@@ -22,6 +22,8 @@ typedef struct Select {
     float unit; /* density of a weight of 1 */
     float own;  /* density of a particle alone */
     uint8_t *state;
+    uint32_t *candidates; /* in their order, those that are gone left out */
+    uint32_t candidate_count;
     float *constant; /* of what can push points out: solids that they do not fit, existing water */
     float *walls;    /* of walls that they fit */
     int32_t *sum;
@@ -32,6 +34,12 @@ typedef struct Select {
     _Pragma("omp parallel for schedule(static, BLOCK) num_threads(select->threads)") for (uint32_t i = 0;    \
                                                                                           i < select->count; \
                                                                                           i++)
+
+#define EACH_CANDIDATE                                                                                       \
+    _Pragma("omp parallel for schedule(static) num_threads(select->threads)") for (uint32_t k = 0;           \
+                                                                                   k <                       \
+                                                                                   select->candidate_count;  \
+                                                                                   k++)
 
 int rest_row(const PairData *pairs, uint32_t i, RestNeighbour *row) {
     const uint32_t slice = i / SLICE, lane = i % SLICE, first = slice * SLICE;
@@ -73,6 +81,11 @@ static const float HALF_SPACE = 0.5f;
 static void find_candidates(Select *select) {
     /* half a radius is an eighth of the support; q = 1/8 in the kernel */
     const int32_t too_close = (int32_t)(32767.0f * (1.0f - 6.0f / 64.0f * (1.0f - 1.0f / 8.0f)));
+    const bool has_existing = select->cloud->has_existing;
+    uint8_t *exists = select->cloud->fate.data; /* not needed any more; a byte a neighbour is less to read */
+    EACH_POINT {
+        exists[i] = kind_of(select, i) == REST_EXISTING;
+    }
     EACH_POINT {
         const RestKind kind = kind_of(select, i);
         select->state[i] = PASSIVE;
@@ -80,9 +93,9 @@ static void find_candidates(Select *select) {
             continue;
         RestNeighbour row[MAX_NEIGHBOURS];
         int32_t existing = 0, closest = 0;
-        const int length = select->cloud->has_existing ? rest_row(select->pairs, i, row) : 0;
+        const int length = has_existing ? rest_row(select->pairs, i, row) : 0;
         for (int k = 0; k < length; k++) {
-            if (kind_of(select, row[k].index) != REST_EXISTING)
+            if (!exists[row[k].index])
                 continue;
             existing += row[k].weight;
             closest = row[k].weight > closest ? row[k].weight : closest;
@@ -96,17 +109,25 @@ static void find_candidates(Select *select) {
     }
 }
 
+static void list_candidates(Select *select) {
+    select->candidates = select->cloud->order.data;
+    select->candidate_count = 0;
+    for (uint32_t i = 0; i < select->count; i++)
+        if (select->state[i] == CANDIDATE)
+            select->candidates[select->candidate_count++] = i;
+}
+
 static void sum_weights(Select *select) {
-    EACH_POINT {
-        if (select->state[i] != CANDIDATE)
-            continue;
+    const uint8_t *exists = select->cloud->fate.data; /* find_candidates */
+    EACH_CANDIDATE {
+        const uint32_t i = select->candidates[k];
         RestNeighbour row[MAX_NEIGHBOURS];
         int32_t sum = 0;
         const int length = rest_row(select->pairs, i, row);
-        for (int k = 0; k < length; k++) {
-            const uint32_t j = row[k].index;
-            if (select->state[j] != GONE && kind_of(select, j) != REST_EXISTING)
-                sum += row[k].weight;
+        for (int n = 0; n < length; n++) {
+            const uint32_t j = row[n].index;
+            if (select->state[j] != GONE && !exists[j])
+                sum += row[n].weight;
         }
         select->sum[i] = sum;
     }
@@ -121,15 +142,14 @@ typedef struct DensitySums {
 } DensitySums;
 
 static DensitySums measure(Select *select) {
-    EACH_POINT {
-        if (select->state[i] == CANDIDATE)
-            select->density[i] =
-                select->own + select->constant[i] + select->walls[i] + select->unit * (float)select->sum[i];
+    EACH_CANDIDATE {
+        const uint32_t i = select->candidates[k];
+        select->density[i] =
+            select->own + select->constant[i] + select->walls[i] + select->unit * (float)select->sum[i];
     }
     DensitySums sums = {0};
-    for (uint32_t i = 0; i < select->count; i++) {
-        if (select->state[i] != CANDIDATE)
-            continue;
+    for (uint32_t k = 0; k < select->candidate_count; k++) {
+        const uint32_t i = select->candidates[k];
         if (select->cloud->points.position[i][1] >= select->cloud->counted_below)
             continue;
         const double density = (double)select->density[i];
@@ -179,35 +199,45 @@ static void protect(Select *select, float limit) {
     if (select->params->rest_rule != REST_RULE_PROTECTION)
         return;
     if (select->params->rest_protector == REST_PROTECTOR_PRINTED) {
-        for (uint32_t i = 0; i < select->count; i++)
+        for (uint32_t k = 0; k < select->candidate_count; k++) {
+            const uint32_t i = select->candidates[k];
             if (select->state[i] == MARKED && is_protected(select, i, limit))
                 select->state[i] = CANDIDATE;
+        }
         return;
     }
-    EACH_POINT {
+    EACH_CANDIDATE {
+        const uint32_t i = select->candidates[k];
         stays[i] = select->state[i] == MARKED && is_protected(select, i, limit);
     }
-    EACH_POINT {
+    EACH_CANDIDATE {
+        const uint32_t i = select->candidates[k];
         if (stays[i])
             select->state[i] = CANDIDATE;
     }
 }
 
 static void remove_above(Select *select, float limit) {
-    EACH_POINT {
-        if (select->state[i] == CANDIDATE && select->density[i] > limit)
+    EACH_CANDIDATE {
+        const uint32_t i = select->candidates[k];
+        if (select->density[i] > limit)
             select->state[i] = MARKED;
     }
     protect(select, limit);
-    for (uint32_t i = 0; i < select->count; i++) {
-        if (select->state[i] != MARKED)
+    uint32_t left = 0;
+    for (uint32_t k = 0; k < select->candidate_count; k++) {
+        const uint32_t i = select->candidates[k];
+        if (select->state[i] != MARKED) {
+            select->candidates[left++] = i;
             continue;
+        }
         select->state[i] = GONE;
         RestNeighbour row[MAX_NEIGHBOURS];
         const int length = rest_row(select->pairs, i, row);
         for (int n = 0; n < length; n++)
             select->sum[row[n].index] -= row[n].weight;
     }
+    select->candidate_count = left;
 }
 
 /* Sec. 3.1.2. Densities are in units of rest density. */
@@ -264,19 +294,26 @@ static bool reserve(Select *select, Err *err) {
 /* What stands beside the candidates that are left. */
 static void mark_rim(Select *select) {
     uint64_t *id = select->cloud->points.id;
-    for (uint32_t i = 0; i < select->count; i++) {
+    uint8_t *touched = select->cloud->fate.data; /* not needed any more */
+    memset(touched, 0, select->count);
+    EACH_POINT {
         if (select->state[i] != CANDIDATE)
             continue;
         RestNeighbour row[MAX_NEIGHBOURS];
         const int length = rest_row(select->pairs, i, row);
         for (int k = 0; k < length; k++) {
-            const uint32_t j = row[k].index;
-            const RestKind kind = rest_kind(id[j]);
-            if (kind == REST_EXISTING)
-                id[j] = rest_id(REST_EXISTING_RIM, id[j]);
-            else if (select->state[j] == PASSIVE && (kind == REST_FLUID || kind == REST_SUPPORT))
-                id[j] = rest_id(REST_RIM, id[j]);
+#pragma omp atomic write
+            touched[row[k].index] = 1;
         }
+    }
+    EACH_POINT {
+        const RestKind kind = rest_kind(id[i]);
+        if (!touched[i])
+            continue;
+        if (kind == REST_EXISTING)
+            id[i] = rest_id(REST_EXISTING_RIM, id[i]);
+        else if (select->state[i] == PASSIVE && (kind == REST_FLUID || kind == REST_SUPPORT))
+            id[i] = rest_id(REST_RIM, id[i]);
     }
 }
 
@@ -326,6 +363,7 @@ bool rest_select(SkiffSim *sim, SkiffFill *fill, Err *err) {
     select.unit = select.own / 32767.0f;
     add_solids(&select);
     find_candidates(&select);
+    list_candidates(&select);
     sum_weights(&select);
     run_passes(&select, fill);
     keep_selected(&select, fill);
