@@ -91,7 +91,7 @@ static void sheets_print_the_paper_below(void **state) {
     free(text);
     text = printed(sheet_write_html, &sheet);
     assert_non_null(strstr(text, "<h2>A &lt;small&gt; sheet</h2>"));
-    assert_non_null(strstr(text, "<td>3.0<br><small>2.0 to 4.0</small></td>"));
+    assert_non_null(strstr(text, "<td>3.0<br><small>2.0 \u2013 4.0</small></td>"));
     assert_non_null(strstr(text, "<td>33.0</td>"));
     assert_non_null(strstr(text, "<td class=\"soft\">31.2</td>"));
     free(text);
