@@ -41,10 +41,11 @@ static const char style[] =
     "th:first-child,td:first-child{text-align:left}tr:last-child "
     "td{border-bottom:0}th{color:var(--soft);font-weight:600}"
     "tr.sum td{font-weight:600}code{font-size:.9em;overflow-wrap:anywhere}"
-    "table.dense{font-size:.78rem}.dense th,.dense td{padding:5px 6px}.dense th{white-space:normal}"
+    "table.dense{font-size:.78rem}.dense th,.dense td{padding:5px 6px}.dense "
+    "th{white-space:normal;vertical-align:bottom}"
     ".dense th:first-child,.dense td:first-child{position:sticky;left:0;background:var(--card);"
     "padding-left:12px}"
-    "td small{font-weight:400;color:var(--soft)}.wide+.charts{margin-top:14px}"
+    "td small{font-weight:400;color:var(--soft)}.wide+.charts{margin-top:14px}.charts+p{margin-top:10px}"
     "@media(max-width:560px){.ticks text,text.label{font-size:17px}main{padding:16px 10px 32px}}"
     "@media print{body{background:#fff}figure,.figures div{break-inside:avoid}}";
 

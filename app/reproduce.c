@@ -367,11 +367,12 @@ static bool write_page(const Reproduction *run, Err *err) {
         fprintf(out,
                 "<p>Particles of radius %g m where the paper has %g m: a quick look, not a comparison.</p>\n",
                 reproduce_radius(run->args), CARENSAC_RADIUS);
-    fputs("<p>In fills, rows with the paper's name follow its method: only particles near solids and "
-          "existing water "
-          "settle, for at most ten steps, and nothing is calmed afterwards either. Rows named "
-          "<i>defaults</i> are what the program does by itself.</p>\n",
-          out);
+    if (wants(run, CARENSAC_TABLE1) || wants(run, CARENSAC_FIG2))
+        fputs("<p>In fills, rows with the paper's name follow its method: only particles near solids and "
+              "existing water "
+              "settle, for at most ten steps, and nothing is calmed afterwards either. Rows named "
+              "<i>defaults</i> are what the program does by itself.</p>\n",
+              out);
     for (int s = 0; s < CARENSAC_SHEET_COUNT; s++) {
         if (!wants(run, (CarensacSheet)s))
             continue;

@@ -220,9 +220,13 @@ static void write_cell(FILE *out, const char *before, double value, int decimals
 }
 
 void sheet_write_html(FILE *out, const Sheet *sheet) {
+    int most_runs = 0;
+    for (int r = 0; r < sheet->row_count; r++)
+        most_runs = sheet->rows[r].run_count > most_runs ? sheet->rows[r].run_count : most_runs;
     fputs("<h2>", out);
     svg_text(out, sheet->title);
-    fputs("</h2>\n<p class=\"soft\">Medians, quartiles below; paper: ", out);
+    fprintf(out, "</h2>\n<p class=\"soft\">%s",
+            most_runs > 1 ? "Medians, quartiles below; paper: " : "Paper: ");
     svg_text(out, sheet->source);
     /* many columns: smaller, and the rows' names stay where a narrow window scrolls */
     fprintf(out, "</p>\n<div class=\"wide\"><table%s><tr><th></th>",

@@ -177,8 +177,10 @@ static double to_y(const Plot *plot, double value) {
 
 static void print_tick(FILE *out, const Axis *axis, double value) {
     double shown = fabs(value) < 1e-12 ? 0.0 : value / axis->label_scale;
-    if (axis->is_logarithmic && value < 0.99e-3)
+    if (axis->is_logarithmic && (value < 0.99e-3 || value > 0.99e9))
         fprintf(out, "1e%.0f", log10(value));
+    else if (axis->is_logarithmic && value > 0.99e3)
+        fprintf(out, value < 0.99e6 ? "%.0fk" : "%.0fM", value / (value < 0.99e6 ? 1e3 : 1e6));
     else if (axis->decimals < 0)
         fprintf(out, "%.3g", shown);
     else

@@ -365,7 +365,8 @@ bool sim_near_body(const SkiffSim *sim, const float p[3], double margin) {
     for (int k = 0; k < 3; k++)
         world[k] = (double)p[k] + sim->origin[k];
     for (int b = 0; b < sim->body_count; b++)
-        if (body_box_distance_sq(&sim->bodies[b], world, local) < margin * margin)
+        if (body_box_distance_sq(&sim->bodies[b], world, local) < margin * margin &&
+            (double)mesh_distance(&sim->bodies[b].mesh, local, NULL) < margin)
             return true;
     return false;
 }

@@ -96,7 +96,7 @@ void probes_free(SkiffSim *sim);
 
 /* sim->pressure from the pressures of both solves. */
 void sim_add_pressures(SkiffSim *sim);
-/* Is p within `margin` (m) of the box, in its own axes, that holds a body? Bodies touch water too. */
+/* Is p within `margin` (m) of a body? Bodies touch water too. */
 bool sim_near_body(const SkiffSim *sim, const float p[3], double margin);
 
 /* Room for `capacity` particles in everything a step uses; what is there stays. */

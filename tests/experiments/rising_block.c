@@ -3,13 +3,13 @@
  *
  * Block 49 x 24 x 48 mm of density 800.52 in a tank of 150 x 140 mm with 52 mm of water (with the block in
  * it), r 1.25 mm, dt 0.8 ms, volumeFactor 1 (a lattice at rest density needs little settling at this
- * size). Held for 0.3 s, then free. The depth is met, not the volume: walls keep water away, so the volume
- * of the experiment would stand 5 mm higher here.
+ * size). Held for 0.3 s, then free.
  *
  * Expected: data/04_wu2014_floating_box_rise.csv. The instant of release is not sharp there (0.05 to 0.1
- * s), and a block that lies on the floor cannot rise here, as no particle fits under it: it is held one
- * layer of particles above the floor (4.4 r, 5.5 mm). So the curves are laid over each other where the
- * centre passes 30 mm on its way up, half of the rise, and compared from there to 1.0 s later.
+ * s), and a block that lies on the floor cannot rise here, as no particle fits under it; with one layer of
+ * particles it takes half a second to come free: it is held two layers above the floor (5.1 mm). So the
+ * curves are laid over each other where the centre passes 30 mm on its way up, half of the rise, and compared
+ * from there to 1.0 s later.
  *
  * Tolerances: height of the first peak within one particle distance, 2.5 mm: half of it for the level of
  * the water and half for the layer around the hull, the same half each that a floating box is granted.
@@ -58,13 +58,13 @@ static int simulate(const Experiment *experiment) {
     experiment_tank(&def, 0.150f, 0.14f, 0.140f);
     def.tank.open = false;
     SkiffBodyDef body = experiment_box("block", (const float[3]){0.049f, 0.024f, 0.048f},
-                                       (const float[3]){0.075f, 0.012f + 2 * gap + 2 * r, 0.070f}, 800.52f);
+                                       (const float[3]){0.075f, 0.012f + 2 * gap + 4 * r, 0.070f}, 800.52f);
     body.release_time = 0.3;
     def.bodies = &body;
     def.body_count = 1;
     def.block_count = 1;
-    /* what the experiment gives is the depth, so the depth is met: a gap and 21 layers reach 52.6 mm, and they
-     * fill the tank from wall to wall */
+    /* what the experiment gives is the depth, so the depth is met: a gap and 21 layers reach 52.6 mm, and
+     * they fill the tank from wall to wall */
     const SkiffBlockDef block = experiment_block(&def, 60, 21, 56);
     def.blocks = &block;
     SkiffSim *sim = experiment_create(&def);

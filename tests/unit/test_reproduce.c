@@ -91,7 +91,7 @@ static void sheets_print_the_paper_below(void **state) {
     free(text);
     text = printed(sheet_write_html, &sheet);
     assert_non_null(strstr(text, "<h2>A &lt;small&gt; sheet</h2>"));
-    assert_non_null(strstr(text, "<td>3.0<br><small>2.0 to 4.0</small></td>"));
+    assert_non_null(strstr(text, "<td>3.0<br><small>2.0 \u2013 4.0</small></td>"));
     assert_non_null(strstr(text, "<td>33.0</td>"));
     assert_non_null(strstr(text, "<td class=\"soft\">31.2</td>"));
     free(text);
@@ -291,6 +291,15 @@ static void carried_scenes_are_the_files(void **state) {
         assert_int_equal(carried->def.body_count, file->def.body_count);
         assert_memory_equal(&carried->def.params, &file->def.params, sizeof file->def.params);
         assert_string_equal(carried->title, file->title);
+        scene_free(carried);
+        /* with all the meshes that it names */
+        static const char *const coarse[] = {"particleRadius=0.1", "timeStepSize=0.012"};
+        carried = carried_scene(names[k], coarse, 2, &err);
+        SkiffSim *sim = carried ? carried_start(carried, folder, 1, SKIFF_SIMD_AUTO, &err) : NULL;
+        if (!sim)
+            fail_msg("%s", err.message);
+        assert_true(skiff_particles(sim).count > 1000);
+        skiff_destroy(sim);
         scene_free(carried);
         scene_free(file);
     }
