@@ -369,7 +369,7 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
                                   .held = settle->held,
                                   /* Beside water that stands still a tighter stop presses the new into it:
                                    * single particles left at 0.4 m/s where it is 0.16. */
-                                  .settling = settle->held != NULL,
+                                  .settling = settle->held != NULL && !settle->layer,
                                   .evaluated_count = settle->active,
                                   .threads = settle->sim->threads};
     scale_pressures(settle->particles, scale * scale);
