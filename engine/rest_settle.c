@@ -26,9 +26,9 @@ static const double FIRST_ALPHA = 0.8, LAST_ALPHA = 0.1;
 /* Longest step, r / sqrt(p / rho0): beyond 1.5 it is unstable, whatever depth and radius. */
 static const float LONGEST = 1.35f;
 /* The solves of moving water stop when the two-sided error is 0.6 of a tolerance. In a layer that is let go
- * only after more steps, or as the paper does it, the one-sided error, half of that, may be all of the
- * tolerance, as the paper's; whatever the last steps leave moves the first free ones. */
-static const float LAYER_ERRORS = 3.3f, LAST_ERRORS = 0.5f;
+ * only after more steps it may be all of the tolerance, as the paper does it the one-sided error, half of
+ * that; whatever the last steps leave moves the first free ones. */
+static const float PAPER_ERRORS = 3.3f, LAYER_ERRORS = 1.6f, LAST_ERRORS = 0.5f;
 /* Of a density error of held water, the share that a step turns into pressure: with 1 its pressures swing. */
 static const float HELD_SHARE = 0.15f;
 /* Of what two particles lack to the distance of a radius, the share that each moves a step. */
@@ -354,7 +354,9 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
     SkiffParams *params = &settle->params;
     const double unit = (double)(params->particle_radius / params->time_step);
     const float scale = step_scale(settle);
-    const float errors = settle->layer ? LAYER_ERRORS : LAST_ERRORS;
+    const float errors = !settle->layer                                  ? LAST_ERRORS
+                         : params->rest_settle == REST_SETTLE_CANDIDATES ? PAPER_ERRORS
+                                                                         : LAYER_ERRORS;
     params->max_density_error = errors * params->rest_density_error;
     params->max_divergence_error *= errors;
     params->softening = params->rest_softening;
@@ -369,7 +371,7 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
                                   .held = settle->held,
                                   /* Beside water that stands still a tighter stop presses the new into it:
                                    * single particles left at 0.4 m/s where it is 0.16. */
-                                  .settling = settle->held != NULL && !settle->layer,
+                                  .settling = settle->held != NULL,
                                   .evaluated_count = settle->active,
                                   .threads = settle->sim->threads};
     scale_pressures(settle->particles, scale * scale);
