@@ -12,7 +12,11 @@
  *
  * The balance: water keeps EXPERIMENT_GAP r from the hull, so it is a sphere of a + 1.2 r that displaces,
  * and it floats higher than its centre. The hold is computed with that layer; the motion is measured about
- * the balance found from its own extremes. */
+ * the balance found from its own extremes.
+ *
+ * With pressureSolver split; --solver gcr shows the default, whose waves are too fast, and with them the
+ * heave
+ * (-8 %). */
 #define EXPERIMENT_OFFSET 1.15f /* bodies displace what they are, not a layer of water more */
 #include "experiment.h"
 
@@ -70,6 +74,8 @@ static SkiffSim *make_balanced(const Experiment *experiment) {
 
 int main(int argc, char **argv) {
     Experiment experiment = experiment_begin("hemisphere", argc, argv);
+    if (experiment.solver < 0)
+        experiment.solver = SKIFF_SOLVER_SPLIT;
     const double a = radius, expected = 6.302 * sqrt(a / EXPERIMENT_G);
     SkiffSim *sim = make_balanced(&experiment);
     experiment_note(&experiment, "particles", skiff_particles(sim).count, "");

@@ -7,13 +7,17 @@
  *
  * Expected: data/04_wu2014_floating_box_rise.csv. The instant of release is not sharp there (0.05 to 0.1
  * s), and a block that lies on the floor cannot rise here, as no particle fits under it; with one layer of
- * particles it takes half a second to come free: it is held two layers above the floor (5.1 mm). So the
+ * particles it takes half a second to come free: and with two it stays: layers
+ * between two walls are jammed. It is held three layers above the floor (7.6 mm). So the
  * curves are laid over each other where the centre passes 30 mm on its way up, half of the rise, and compared
  * from there to 1.0 s later.
  *
  * Tolerances: height of the first peak within one particle distance, 2.5 mm: half of it for the level of
  * the water and half for the layer around the hull, the same half each that a floating box is granted.
- * RMSE of y(t): the same 2.5 mm. Times and the mean height of the bobbing are noted. */
+ * RMSE of y(t): the same 2.5 mm. Times and the mean height of the bobbing are noted.
+ *
+ * With pressureSolver split: the default's water resists shear and lets the block rise at half the speed and
+ * leap by a third. */
 #define EXPERIMENT_OFFSET 1.15f /* bodies displace what they are, not a layer of water more */
 #include "experiment.h"
 
@@ -58,7 +62,7 @@ static int simulate(const Experiment *experiment) {
     experiment_tank(&def, 0.150f, 0.14f, 0.140f);
     def.tank.open = false;
     SkiffBodyDef body = experiment_box("block", (const float[3]){0.049f, 0.024f, 0.048f},
-                                       (const float[3]){0.075f, 0.012f + 2 * gap + 4 * r, 0.070f}, 800.52f);
+                                       (const float[3]){0.075f, 0.012f + 2 * gap + 6 * r, 0.070f}, 800.52f);
     body.release_time = 0.3;
     def.bodies = &body;
     def.body_count = 1;
@@ -82,6 +86,8 @@ static int simulate(const Experiment *experiment) {
 int main(int argc, char **argv) {
     Experiment experiment = experiment_begin("rising_block", argc, argv);
     const ExperimentCurve wu = experiment_curve("04_wu2014_floating_box_rise.csv", NULL, 0, 1);
+    if (experiment.solver < 0)
+        experiment.solver = SKIFF_SOLVER_SPLIT;
     const int count = simulate(&experiment);
     const double there = rise_time(wu.x, wu.y, wu.count, 0.030), here = rise_time(t, y, count, 0.030);
     FileWriter series = experiment_series(&experiment, "series", "t_s,y_m,experiment_y_m");
