@@ -37,6 +37,7 @@ typedef struct CliArgs {
     double min[3], max[3]; /* rest cut, m; NaN: not given */
     int free_steps;        /* rest fill */
     int runs;              /* reproduce */
+    bool paper_only;       /* reproduce */
     double radius;         /* reproduce, m; NaN: the standard one */
     bool help;
 } CliArgs;

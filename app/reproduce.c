@@ -191,6 +191,8 @@ static bool fill_row(Reproduction *run, Sheet *sheet, int row, const Filling *fi
 
 static bool run_table1(Reproduction *run, Err *err) {
     Sheet *sheet = &run->sheets[CARENSAC_TABLE1];
+    if (run->args->paper_only)
+        sheet->row_count = CARENSAC_FILL_COUNT; /* the others come after them and hold nothing yet */
     bool good = true;
     for (int row = 0; good && row < sheet->row_count; row++) {
         const Filling filling = {row % CARENSAC_FILL_COUNT, (CarensacMethod)(row / CARENSAC_FILL_COUNT),
