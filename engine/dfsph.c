@@ -53,22 +53,21 @@ static const double STEADY_SAFETY = 0.4;
 
 bool dfsph_reserve(Dfsph *dfsph, uint32_t particle_capacity, uint32_t object_count, Err *err) {
     const size_t padded = particle_capacity + BLOCK, blocks = padded / BLOCK;
-    const size_t bytes = padded * ((2 + DFSPH_CARRIED) * sizeof(Float4) + 7 * sizeof(float)) +
+    const size_t bytes = padded * (5 * sizeof(Float4) + 7 * sizeof(float)) +
                          blocks * (DFSPH_SUMS * sizeof(double) + 1) +
-                         (size_t)object_count * (2 + DFSPH_CARRIED) * sizeof *dfsph->response;
+                         (size_t)object_count * 2 * sizeof *dfsph->response;
     if (!buffer_reserve(&dfsph->buffer, "pressure solver", bytes, err))
         return false;
     char *next = dfsph->buffer.data;
 #define TAKE(field, count) (dfsph->field = (void *)next, next += (count) * sizeof *dfsph->field)
     TAKE(operand, padded);
     TAKE(guess, padded);
-    for (int k = 0; k < DFSPH_CARRIED; k++)
-        TAKE(answer[k], padded);
+    TAKE(answer, padded);
+    TAKE(spare[0], padded);
+    TAKE(spare[1], padded);
     TAKE(partials, blocks * DFSPH_SUMS);
     TAKE(impulses, object_count);
     TAKE(response, object_count);
-    for (int k = 0; k < DFSPH_CARRIED; k++)
-        TAKE(responses[k], object_count);
     TAKE(residual, padded);
     TAKE(direction, padded);
     TAKE(image, padded);
@@ -139,7 +138,7 @@ static void set_operand(Dfsph *dfsph, const DfsphProblem *problem, const float *
 /* result = base + scale D^T p for the fluid, response = D^T p for the bodies; p is the operand's. base NULL:
  * 0. */
 static void apply_transpose(Dfsph *dfsph, const DfsphProblem *problem, const Float4 *base, float scale,
-                            Float4 *result, double (*response)[6]) {
+                            Float4 *result) {
     const uint32_t blocks = particles_blocks(problem->particles);
     const PairData *pairs = dfsph->pairs;
     const AccelerateJob job = {
@@ -157,7 +156,7 @@ static void apply_transpose(Dfsph *dfsph, const DfsphProblem *problem, const Flo
     const double mass = (double)pairs->volume * (double)problem->params->rest_density;
     for (int b = 0; b < problem->body_count; b++) {
         const double *impulse = dfsph->impulses[1 + b];
-        double *answer = response[1 + b];
+        double *answer = dfsph->response[1 + b];
         matrix_times((const double(*)[3])problem->bodies[b].inv_inertia, impulse + 3, answer + 3);
         for (int k = 0; k < 3; k++) {
             answer[k] = -mass * problem->bodies[b].inv_mass[k] * impulse[k];
@@ -189,11 +188,10 @@ static void divergence_block(const Dfsph *dfsph, const DfsphProblem *problem, co
         subtract_bodies(problem->boundary, velocities, result, block);
 }
 
-/* guess = velocity - D^T p / dt, p the operand's; the bodies' share stays in `response`. */
-static void apply_pressure(Dfsph *dfsph, const DfsphProblem *problem) {
+/* result = velocity - D^T p / dt, p the operand's; the bodies' share stays in `response`. */
+static void apply_pressure(Dfsph *dfsph, const DfsphProblem *problem, Float4 *result) {
     apply_transpose(dfsph, problem, (const Float4 *)problem->particles->velocity,
-                    -1.0f / problem->params->time_step, dfsph->guess, dfsph->response);
-    dfsph->carried.count = 0;
+                    -1.0f / problem->params->time_step, result);
 }
 
 /* Velocities of the bodies after the pressure so far. */
@@ -207,31 +205,20 @@ static void body_velocities(const Dfsph *dfsph, const DfsphProblem *problem, dou
         }
 }
 
-/* The velocities that go with all of the pressure: guess and the answers since. What the projection cut off
- * the pressure on the way is still in them, as it is in the residual, which the tolerance bounds; and bodies
- * get what the fluid gives. (The present pressure's own answer would be one more application.) */
-static void add_answers(Dfsph *dfsph, const DfsphProblem *problem, Float4 *to) {
-    const uint32_t blocks = particles_blocks(problem->particles), count = problem->particles->count;
-    const Carried *carried = &dfsph->carried;
-    float scale[DFSPH_CARRIED];
-    for (int a = 0; a < carried->count; a++)
-        scale[a] = (float)(-carried->length[a] / (double)problem->params->time_step);
-    EACH_BLOCK {
-        for (uint32_t i = block * BLOCK; i < (block + 1) * BLOCK; i++) {
-            if (problem->held != NULL && (i >= count || problem->held[i]))
-                continue;
-            float v[4];
-            memcpy(v, dfsph->guess[i], sizeof v);
-            for (int a = 0; a < carried->count; a++)
-                for (int k = 0; k < 4; k++)
-                    v[k] += scale[a] * dfsph->answer[a][i][k];
-            memcpy(to[i], v, sizeof v);
-        }
+/* The fluid's velocities after the solve, by the pressure itself. (The answers of the iterations add up to
+ * the same at less cost, but for what the projection cut: with that in their velocities lone drops fly
+ * apart.) What is held is kept out by way of a copy: the passes write whole blocks. */
+static void change_velocities(Dfsph *dfsph, const DfsphProblem *problem) {
+    Float4 *velocity = problem->particles->velocity;
+    if (problem->held == NULL) {
+        apply_pressure(dfsph, problem, velocity);
+        return;
     }
-    for (int a = 0; dfsph->moving && a < carried->count; a++)
-        for (int b = 1; b <= problem->body_count; b++)
-            for (int k = 0; k < 6; k++)
-                dfsph->response[b][k] += carried->length[a] * dfsph->responses[a][b][k];
+    apply_pressure(dfsph, problem, dfsph->guess);
+#pragma omp parallel for schedule(static) num_threads(problem->threads)
+    for (uint32_t i = 0; i < problem->particles->count; i++)
+        if (!problem->held[i])
+            memcpy(velocity[i], dfsph->guess[i], sizeof(Float4));
 }
 
 /* ---- Residuals ---- */
@@ -267,8 +254,7 @@ static void still_block(Dfsph *dfsph, uint32_t block) {
     for (size_t i = first; i < first + BLOCK; i++)
         dfsph->operand[i][3] = 0.0f;
     memset(dfsph->residual + first, 0, BLOCK * sizeof(float));
-    for (int a = 0; a < DFSPH_CARRIED; a++)
-        memset(dfsph->answer[a] + first, 0, BLOCK * sizeof(Float4));
+    memset(dfsph->answer + first, 0, BLOCK * sizeof(Float4));
     memset(dfsph->partials + (size_t)block * DFSPH_SUMS, 0, DFSPH_SUMS * sizeof(double));
 }
 
@@ -276,7 +262,7 @@ static void still_block(Dfsph *dfsph, uint32_t block) {
  * A. */
 static Errors evaluate_residual(Dfsph *dfsph, const DfsphProblem *problem, const float *p) {
     const uint32_t blocks = particles_blocks(problem->particles);
-    apply_pressure(dfsph, problem);
+    apply_pressure(dfsph, problem, dfsph->guess);
     double(*velocities)[6] = dfsph->impulses; /* no longer needed */
     if (dfsph->moving)
         body_velocities(dfsph, problem, velocities);
@@ -433,14 +419,12 @@ typedef struct GcrSums {
  * active set. */
 static GcrSums gcr_apply(Dfsph *dfsph, const DfsphProblem *problem, const float *p) {
     const uint32_t blocks = particles_blocks(problem->particles);
-    const int place = dfsph->carried.count % DFSPH_CARRIED;
-    dfsph->carried.count++;
-    apply_transpose(dfsph, problem, NULL, 1.0f, dfsph->answer[place], dfsph->responses[place]);
+    apply_transpose(dfsph, problem, NULL, 1.0f, dfsph->answer);
     EACH_BLOCK {
         if (dfsph->still[block])
             continue;
-        divergence_block(dfsph, problem, (const Float4 *)dfsph->answer[place],
-                         (const double(*)[6])dfsph->responses[place], dfsph->new_image, block);
+        divergence_block(dfsph, problem, (const Float4 *)dfsph->answer, (const double(*)[6])dfsph->response,
+                         dfsph->new_image, block);
         LaneSum sums[5] = {0};
         EACH_SLICE {
             const float *r = dfsph->residual + first, *q = dfsph->image + first,
@@ -509,17 +493,6 @@ static double gcr_update(Dfsph *dfsph, const DfsphProblem *problem, float *p, fl
     return totals[2] / count;
 }
 
-/* The pressure went alpha along d = z - beta d. */
-static void carry(Carried *carried, double alpha, double beta) {
-    if (carried->count > DFSPH_CARRIED)
-        return;
-    for (int a = 0; a < carried->count; a++) {
-        const bool newest = a == carried->count - 1;
-        carried->share[a] = newest ? 1.0 : -beta * carried->share[a];
-        carried->length[a] = (newest ? 0.0 : carried->length[a]) + alpha * carried->share[a];
-    }
-}
-
 typedef struct SolveLimits {
     double tolerance; /* relative density */
     double safety;
@@ -542,7 +515,6 @@ static SolveResult solve_gcr(Dfsph *dfsph, const DfsphProblem *problem, float *p
         has_direction = alpha > 0.0;
         const float step = has_direction ? (float)alpha : 0.0f;
         cut += gcr_update(dfsph, problem, p, step, (float)beta, &errors);
-        carry(&dfsph->carried, (double)step, (double)(float)beta);
         if (!has_direction && beta == 0.0)
             break; /* the residual has nothing left along any direction */
         if (cut > 0.5 * tolerance && iterations < limits.max) {
@@ -617,12 +589,8 @@ SolveResult dfsph_solve(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kin
     dfsph->moving = problem->body_count > 0 && problem->boundary->moving.samples.count != 0;
     dfsph->answering = kind != SOLVE_SHIFT;
     dfsph->shifting = kind == SOLVE_SHIFT;
-    if (dfsph->moving) { /* bodies that do not answer */
-        const size_t bytes = (1 + (size_t)problem->body_count) * sizeof *dfsph->response;
-        memset(dfsph->response, 0, bytes);
-        for (int a = 0; a < DFSPH_CARRIED; a++)
-            memset(dfsph->responses[a], 0, bytes);
-    }
+    if (dfsph->moving)
+        memset(dfsph->response, 0, (1 + (size_t)problem->body_count) * sizeof *dfsph->response);
     prepare(dfsph, problem, kind, p);
     const SolveLimits limits = solve_limits(dfsph, problem, kind);
     const bool jacobi = problem->params->pressure_solver == SKIFF_SOLVER_JACOBI;
@@ -630,11 +598,11 @@ SolveResult dfsph_solve(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kin
         jacobi ? solve_jacobi(dfsph, problem, p, limits) : solve_gcr(dfsph, problem, p, limits);
     if (kind == SOLVE_DENSITY || kind == SOLVE_SHIFT)
         predict_density(dfsph, problem);
-    if (jacobi || dfsph->carried.count > DFSPH_CARRIED) {
-        set_operand(dfsph, problem, p);
-        apply_pressure(dfsph, problem);
-    }
-    add_answers(dfsph, problem, kind == SOLVE_SHIFT ? dfsph->guess : problem->particles->velocity);
+    set_operand(dfsph, problem, p);
+    if (kind == SOLVE_SHIFT)
+        apply_pressure(dfsph, problem, dfsph->guess);
+    else
+        change_velocities(dfsph, problem);
     if (dfsph->moving && kind != SOLVE_SHIFT)
         change_bodies(dfsph, problem);
     return result;

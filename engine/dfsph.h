@@ -20,24 +20,12 @@ typedef struct SolveResult {
     double residual; /* mean two-sided residual: |r| where there is pressure, max(0, r) elsewhere */
 } SolveResult;
 
-/* Directions of a solve whose answers are kept. */
-enum { DFSPH_CARRIED = 4 };
-
-/* What the pressure of a solve does to velocities is a sum over the directions it went along: the answer to
- * the pressure that the last evaluation had, and these since. */
-typedef struct Carried {
-    int count;                    /* of answers; more than DFSPH_CARRIED: not all are there */
-    double share[DFSPH_CARRIED];  /* of an answer in the present direction */
-    double length[DFSPH_CARRIED]; /* of an answer in the pressure */
-} Carried;
-
 typedef struct Dfsph {
-    Float4 *operand;               /* positions, and what D^T is applied to in the fourth place */
-    Float4 *guess;                 /* velocity after the pressure evaluated last */
-    Float4 *answer[DFSPH_CARRIED]; /* D^T z; for others between the solves, as is guess */
-    double (*response)[6];         /* [objects] a body's answer to the pressure evaluated last: D^T p */
-    double (*responses[DFSPH_CARRIED])[6]; /* and to the z */
-    Carried carried;
+    Float4 *operand;       /* positions, and what D^T is applied to in the fourth place */
+    Float4 *guess;         /* velocity after the pressure evaluated last */
+    Float4 *answer;        /* D^T z */
+    Float4 *spare[2];      /* for others between the solves, as are the two above */
+    double (*response)[6]; /* [objects] a body's answer: (D^T p) of its six velocities */
     float *residual, *direction, *image, *new_image, *inv_diagonal;
     float *source;         /* what stands beside dt D v: relative density */
     double *partials;      /* [blocks][DFSPH_SUMS] */

@@ -71,7 +71,7 @@ void forces_apply_fluid(const DfsphProblem *problem, Dfsph *dfsph) {
     const SkiffParams *params = problem->params;
     const float dt = params->time_step;
     Particles *particles = problem->particles;
-    Float4 *gradient[3] = {dfsph->answer[0], dfsph->answer[1], dfsph->answer[2]};
+    Float4 *gradient[3] = {dfsph->answer, dfsph->spare[0], dfsph->spare[1]};
     const StrainJob strain = {.pairs = &problem->rows->pairs,
                               .velocity = (const Float4 *)particles->velocity,
                               .gradient = {gradient[0], gradient[1], gradient[2]}};

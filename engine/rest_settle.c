@@ -143,15 +143,35 @@ typedef struct SpeedSums {
     double mean, max;
 } SpeedSums;
 
-static SpeedSums measure_speeds(const Settle *settle) {
+static SpeedSums block_speeds(const Settle *settle, uint32_t block) {
+    const Particles *particles = settle->particles;
+    const uint32_t end = (block + 1) * BLOCK < particles->count ? (block + 1) * BLOCK : particles->count;
     SpeedSums sums = {0};
-    for (uint32_t i = 0; i < settle->particles->count; i++) {
+    for (uint32_t i = block * BLOCK; i < end; i++) {
         if (settle->held != NULL && settle->held[i])
             continue;
-        const float *v = settle->particles->velocity[i];
+        const float *v = particles->velocity[i];
         const double speed = sqrt((double)(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]));
         sums.mean += speed;
         sums.max = speed <= sums.max ? sums.max : speed;
+    }
+    return sums;
+}
+
+static SpeedSums measure_speeds(const Settle *settle) {
+    const uint32_t blocks = particles_blocks(settle->particles);
+    double *partials = settle->dfsph->partials; /* free between the solves */
+#pragma omp parallel for schedule(static) num_threads(settle->sim->threads)
+    for (uint32_t block = 0; block < blocks; block++) {
+        const SpeedSums sums = block_speeds(settle, block);
+        partials[(size_t)block * DFSPH_SUMS] = sums.mean;
+        partials[(size_t)block * DFSPH_SUMS + 1] = sums.max;
+    }
+    SpeedSums sums = {0};
+    for (uint32_t block = 0; block < blocks; block++) {
+        const double max = partials[(size_t)block * DFSPH_SUMS + 1];
+        sums.mean += partials[(size_t)block * DFSPH_SUMS];
+        sums.max = max <= sums.max ? sums.max : max;
     }
     sums.mean /= settle->active;
     return sums;
@@ -195,7 +215,8 @@ static float step_scale(const Settle *settle) {
 }
 
 /* P is p dt^2 / rho0: another time step, another P. */
-static void scale_pressures(Particles *particles, float factor) {
+static void scale_pressures(Particles *particles, float factor, int threads) {
+#pragma omp parallel for schedule(static) num_threads(threads)
     for (uint32_t i = 0; i < particles->count; i++) {
         particles->pressure[i] *= factor;
         particles->pressure_divergence[i] *= factor;
@@ -374,7 +395,7 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
                                   .settling = settle->held != NULL,
                                   .evaluated_count = settle->active,
                                   .threads = settle->sim->threads};
-    scale_pressures(settle->particles, scale * scale);
+    scale_pressures(settle->particles, scale * scale, problem.threads);
     bool calm = false;
     for (int step = 0; step < settle->steps && !calm; step++, fill->steps++) {
         if (!search(settle, first_id, err))
@@ -394,7 +415,7 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
                speeds.mean < (double)params->rest_mean_speed * unit;
         move_active(settle, kept_share(params, step));
     }
-    scale_pressures(settle->particles, 1.0f / (scale * scale));
+    scale_pressures(settle->particles, 1.0f / (scale * scale), problem.threads);
     settle->params = given;
     return true;
 }
