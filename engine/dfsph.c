@@ -318,7 +318,8 @@ static float density_source(const SkiffParams *params, float density, float pred
     return patience * params->softening * (density - 1.0f) + expected;
 }
 
-/* Density that the velocities found lead to: rho + dt D v, from the residual that is left. */
+/* Density that the velocities found lead to: rho + dt D v, from the residual that is left. Drops that fly
+ * apart would have less than none, and less than none means water that has just been set free. */
 static void predict_density(const Dfsph *dfsph, const DfsphProblem *problem) {
     const uint32_t blocks = particles_blocks(problem->particles);
     const float *density = problem->rows->pairs.density;
@@ -328,11 +329,11 @@ static void predict_density(const Dfsph *dfsph, const DfsphProblem *problem) {
             float *prediction = &problem->particles->prediction[i];
             if (problem->held != NULL && problem->held[i])
                 continue;
+            const float found = density[i] + dfsph->residual[i] - dfsph->source[i];
             if (*prediction < -less)
                 *prediction += less;
             else
-                *prediction =
-                    dfsph->inv_diagonal[i] > 0.0f ? density[i] + dfsph->residual[i] - dfsph->source[i] : 0.0f;
+                *prediction = dfsph->inv_diagonal[i] > 0.0f && found > 0.0f ? found : 0.0f;
         }
     }
 }
