@@ -1,9 +1,7 @@
 /* Rigid body mechanics. The fluid's impulses come from the pressure solve, which treats a body's motion as
  * unknown (see dfsph.c), so a light body needs no substeps. Not here: collisions between bodies. */
 #include "body.h"
-
 #include "dvec.h"
-
 #include "shape.h"
 
 #include <math.h>

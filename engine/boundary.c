@@ -345,8 +345,7 @@ bool boundary_place(Boundary *boundary, const Body *bodies, int body_count, cons
 }
 
 /* One try: contacts of every block, appended to the common list. False: a particle touches too many objects
- * or samples.
- */
+ * or samples. */
 static bool apply_blocks(Boundary *boundary, const BoundaryJob *job, const Passes *passes, Rows *rows,
                          int threads, uint32_t *fault) {
     const uint32_t blocks = (job->count + BLOCK - 1) / BLOCK;

@@ -107,9 +107,12 @@ static void total_partials(const Dfsph *dfsph, uint32_t blocks, int count, doubl
 }
 
 #define EACH_BLOCK                                                                                           \
-    _Pragma("omp parallel for schedule(dynamic, 8) num_threads(problem->threads)") for (uint32_t block = 0;  \
-                                                                                        block < blocks;      \
-                                                                                        block++)
+    _Pragma(                                                                                                 \
+        "omp parallel for schedule(dynamic, DFSPH_CHUNK) num_threads(problem->threads)") for (uint32_t       \
+                                                                                                  block = 0; \
+                                                                                              block <        \
+                                                                                              blocks;        \
+                                                                                              block++)
 #define EACH_SLICE for (uint32_t first = block * BLOCK; first < (block + 1) * BLOCK; first += SLICE)
 #define EACH_LANE  _Pragma("omp simd") for (uint32_t l = 0; l < LANES; l++)
 
@@ -248,7 +251,8 @@ static inline const float *lower_of(const Dfsph *dfsph, uint32_t first) {
     return dfsph->lower + (dfsph->shifting ? first : 0);
 }
 
-/* Held pressures act on the first evaluation only; from then on a block that is held is left out. */
+/* Held pressures act where P itself is applied; along the directions of a solve nothing of them changes, and
+ * a block that is all held is left out. */
 static void still_block(Dfsph *dfsph, uint32_t block) {
     const size_t first = (size_t)block * BLOCK;
     for (size_t i = first; i < first + BLOCK; i++)
@@ -594,9 +598,9 @@ SolveResult dfsph_solve(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kin
         memset(dfsph->response, 0, (1 + (size_t)problem->body_count) * sizeof *dfsph->response);
     prepare(dfsph, problem, kind, p);
     const SolveLimits limits = solve_limits(dfsph, problem, kind);
-    const bool jacobi = problem->params->pressure_solver == SKIFF_SOLVER_JACOBI;
-    const SolveResult result =
-        jacobi ? solve_jacobi(dfsph, problem, p, limits) : solve_gcr(dfsph, problem, p, limits);
+    const SolveResult result = problem->params->pressure_solver == SKIFF_SOLVER_JACOBI
+                                   ? solve_jacobi(dfsph, problem, p, limits)
+                                   : solve_gcr(dfsph, problem, p, limits);
     if (kind == SOLVE_DENSITY || kind == SOLVE_SHIFT)
         predict_density(dfsph, problem);
     set_operand(dfsph, problem, p);

@@ -39,7 +39,10 @@ typedef struct Dfsph {
     Buffer buffer;
 } Dfsph;
 
-enum { DFSPH_SUMS = 6 };
+enum {
+    DFSPH_SUMS = 6,
+    DFSPH_CHUNK = 8 /* blocks handed out at a time: cores are seldom equally fast */
+};
 
 /* What the solves work on. */
 typedef struct DfsphProblem {

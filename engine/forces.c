@@ -88,11 +88,11 @@ void forces_apply_fluid(const DfsphProblem *problem, Dfsph *dfsph) {
 #pragma omp parallel num_threads(problem->threads)
     {
         if (params->calming > 0.0f) {
-#pragma omp for schedule(dynamic, 8)
+#pragma omp for schedule(dynamic, DFSPH_CHUNK)
             for (uint32_t block = 0; block < blocks; block++)
                 problem->passes->strain(&strain, block);
         }
-#pragma omp for schedule(dynamic, 8)
+#pragma omp for schedule(dynamic, DFSPH_CHUNK)
         for (uint32_t block = 0; block < blocks; block++)
             problem->passes->forces(&job, block);
 #pragma omp for schedule(static)
