@@ -8,6 +8,8 @@
 
 #include <cmocka.h>
 
+#include "refuse.h"
+
 typedef struct Scene {
     SkiffDef def;
     SkiffBodyDef body;
@@ -206,36 +208,26 @@ static void test_body_outruns_the_window(void **state) {
     skiff_destroy(sim);
 }
 
-static void refuse(const Scene *scene, const char *expected) {
-    Err err = {0};
-    SkiffSim *sim = skiff_create(&scene->def, &err);
-    if (sim != NULL)
-        fail_msg("not refused: %s", expected);
-    assert_int_equal(err.code, ERR_INPUT);
-    if (strstr(err.message, expected) == NULL)
-        fail_msg("expected: %s\nfound:    %s", expected, err.message);
-}
-
 static void test_refusals(void **state) {
     (void)state;
     Scene scene;
     scene_make(&scene);
     scene.def.params.volume_factor = 0.9f;
-    refuse(&scene, "Configuration.volumeFactor: 0.9, but filling with water at rest needs 0.8");
+    refuse(&scene.def, "Configuration.volumeFactor: 0.9, but filling with water at rest needs 0.8");
     scene_make(&scene);
     scene.def.tank.geometry.radius = 0.3f;
-    refuse(&scene, "Sea: a window must be at least");
+    refuse(&scene.def, "Sea: a window must be at least");
     scene_make(&scene);
     scene.def.sea.level = 1.5f;
-    refuse(&scene, "Sea.level: 1.5 m, must lie between the tank's floor");
+    refuse(&scene.def, "Sea.level: 1.5 m, must lie between the tank's floor");
     scene_make(&scene);
     follow_body(&scene);
     scene.def.sea.follow = "raft";
-    refuse(&scene, "Sea.follow: there is no body 'raft'");
+    refuse(&scene.def, "Sea.follow: there is no body 'raft'");
     scene_make(&scene);
     follow_body(&scene);
     scene.body.geometry.translation[0] = 2.0f;
-    refuse(&scene, "Sea.follow: body 'box' starts outside the window");
+    refuse(&scene.def, "Sea.follow: body 'box' starts outside the window");
 }
 
 int main(void) {
