@@ -1,6 +1,6 @@
-/* Counting sort of the particles by cell. Each thread counts and later moves one contiguous part of the
- * particles, and the parts are taken in order within a cell, so the sort is stable and its result does not
- * depend on the number of threads. */
+/* Counting sort of the particles by cell, and of groups of them by the size of their rows. Each thread counts
+ * and later moves one contiguous part of the particles, and the parts are taken in order within a cell, so
+ * the sort is stable and its result does not depend on the number of threads. */
 #include "grid.h"
 
 #include <math.h>
@@ -82,15 +82,22 @@ static bool grid_reserve(Grid *grid, const Particles *particles, size_t cells, i
         return false;
     if (!buffer_reserve(&grid->cell_buffer, "cells of particles", padded * sizeof(uint32_t), err) ||
         !buffer_reserve(&grid->unsorted_buffer, "cells before the sort", padded * sizeof(uint32_t), err) ||
+        !buffer_reserve(&grid->member_buffer, "particles by cell", padded * sizeof(uint32_t), err) ||
+        !buffer_reserve(&grid->point_buffer, "positions by cell", 3 * padded * sizeof(float), err) ||
         !buffer_reserve(&grid->order_buffer, "sort order", padded * sizeof(uint32_t), err))
         return false;
     grid->cell = grid->cell_buffer.data;
+    grid->member = grid->member_buffer.data;
+    grid->x = grid->point_buffer.data;
+    grid->y = grid->x + padded;
+    grid->z = grid->y + padded;
     grid->order = grid->order_buffer.data;
     grid->cells.start = grid->start_buffer.data;
     return true;
 }
 
-/* Fills cell, order and the starts; `outside` particles go to the cell after the last. */
+/* Fills cell, member (for now with where the particles are) and the starts; `outside` particles go to the
+ * cell after the last. */
 static void counting_sort(Grid *grid, const Particles *particles, const GridBounds *domain, bool check,
                           int parts) {
     const CellGrid *cells = &grid->cells;
@@ -134,10 +141,62 @@ static void counting_sort(Grid *grid, const Particles *particles, const GridBoun
             const uint32_t end = (uint32_t)((uint64_t)n * (part + 1) / parts);
             for (uint32_t i = (uint32_t)((uint64_t)n * part / parts); i < end; i++) {
                 const uint32_t k = histogram[unsorted[i]]++;
-                grid->order[k] = i;
+                grid->member[k] = i;
                 grid->cell[k] = unsorted[i];
             }
         }
+    }
+}
+
+/* Numbers of neighbours, or of near ones, from a row's size. Larger ones are rare, and wait together. */
+enum { LARGEST_KEY = 63 };
+
+static inline uint32_t row_key(uint32_t row_size, bool near) {
+    const uint32_t count = near ? row_size & 0xffffu : row_size >> 16;
+    return count < LARGEST_KEY ? count : LARGEST_KEY;
+}
+
+/* Stable: members from[0, count) of a group go to `to` by their keys. */
+static void sort_group(const uint32_t *row_size, bool near, const uint16_t *from, uint16_t *to,
+                       uint32_t count) {
+    uint32_t next[LARGEST_KEY + 2] = {0};
+    for (uint32_t k = 0; k < count; k++)
+        next[row_key(row_size[from[k]], near) + 1]++;
+    for (int key = 1; key <= LARGEST_KEY; key++)
+        next[key] += next[key - 1];
+    for (uint32_t k = 0; k < count; k++)
+        to[next[row_key(row_size[from[k]], near)]++] = from[k];
+}
+
+/* Fills order, and turns member from where the particles are to where they will be. */
+static void arrange_groups(Grid *grid, const Particles *particles, uint32_t kept, int threads) {
+#pragma omp parallel for schedule(static) num_threads(threads)
+    for (uint32_t begin = 0; begin < kept; begin += ROW_GROUP) {
+        const uint32_t count = kept - begin < ROW_GROUP ? kept - begin : ROW_GROUP;
+        uint32_t *member = grid->member + begin, row_size[ROW_GROUP];
+        uint16_t by_cell[ROW_GROUP], by_near[ROW_GROUP], by_all[ROW_GROUP];
+        for (uint32_t k = 0; k < count; k++) {
+            row_size[k] = particles->row_size[member[k]];
+            by_cell[k] = (uint16_t)k;
+        }
+        sort_group(row_size, true, by_cell, by_near, count);
+        sort_group(row_size, false, by_near, by_all, count);
+        for (uint32_t place = 0; place < count; place++)
+            grid->order[begin + place] = member[by_all[place]];
+        for (uint32_t place = 0; place < count; place++)
+            member[by_all[place]] = begin + place;
+    }
+}
+
+/* Positions in the order of cells; the slice after the last is read, too. */
+static void copy_points(Grid *grid, const Particles *particles, int threads) {
+    const uint32_t count = particles->count;
+#pragma omp parallel for schedule(static) num_threads(threads)
+    for (uint32_t k = 0; k < count + SLICE; k++) {
+        const float *p = particles->position[k < count ? grid->member[k] : k];
+        grid->x[k] = p[0];
+        grid->y[k] = p[1];
+        grid->z[k] = p[2];
     }
 }
 
@@ -177,13 +236,17 @@ bool grid_sort(Grid *grid, Particles *particles, float cell_size, const GridBoun
     counting_sort(grid, particles, domain, outside != 0, parts);
     if (removed != NULL)
         *removed = outside;
+    arrange_groups(grid, particles, particles->count - outside, threads);
     particles_permute(particles, grid->order, particles->count - outside, threads);
+    copy_points(grid, particles, threads);
     return true;
 }
 
 void grid_free(Grid *grid) {
     buffer_free(&grid->start_buffer);
     buffer_free(&grid->cell_buffer);
+    buffer_free(&grid->member_buffer);
+    buffer_free(&grid->point_buffer);
     buffer_free(&grid->order_buffer);
     buffer_free(&grid->unsorted_buffer);
     buffer_free(&grid->histogram_buffer);

@@ -45,6 +45,10 @@ static inline Vf vf_add(Vf a, Vf b) {
 static inline Vf vf_sub(Vf a, Vf b) {
     return _mm512_sub_ps(a, b);
 }
+/* a > b ? a : b */
+static inline Vf vf_max(Vf a, Vf b) {
+    return _mm512_max_ps(a, b);
+}
 static inline Vf vf_mul(Vf a, Vf b) {
     return _mm512_mul_ps(a, b);
 }
@@ -100,17 +104,20 @@ static inline Vi vi_round(Vf a) {
 static inline Vf vf_from_int(Vi a) {
     return _mm512_cvtepi32_ps(a);
 }
+static inline Vi vi_select(Vm m, Vi yes, Vi no) {
+    return _mm512_mask_blend_epi32(m, no, yes);
+}
 /* to nearest even; |a| <= 32767 */
 static inline void vf_store_i16(int16_t *p, Vf a) {
     vi_store_i16(p, _mm512_cvtps_epi32(a));
 }
-/* out[k][l] = rows[l * stride + k]: sixteen rows of sixteen become columns. */
-static inline void vi_transpose16(const int32_t *rows, int stride, int32_t out[LANES][LANES]) {
+/* out[k][l] = rows[l][from + k]: sixteen rows of sixteen become columns. */
+static inline void vi_transpose16(const int32_t *const rows[LANES], int from, int32_t out[LANES][LANES]) {
     __m512i quad[4][4]; /* [rows 4 i to 4 i + 3][c]: columns c, 4 + c, 8 + c, 12 + c of these */
     for (int i = 0; i < 4; i++) {
-        const int32_t *row = rows + 4 * i * stride;
-        const __m512i a = _mm512_loadu_si512(row), b = _mm512_loadu_si512(row + stride);
-        const __m512i c = _mm512_loadu_si512(row + 2 * stride), d = _mm512_loadu_si512(row + 3 * stride);
+        const int32_t *const *row = rows + 4 * i;
+        const __m512i a = _mm512_loadu_si512(row[0] + from), b = _mm512_loadu_si512(row[1] + from);
+        const __m512i c = _mm512_loadu_si512(row[2] + from), d = _mm512_loadu_si512(row[3] + from);
         const __m512i ab_low = _mm512_unpacklo_epi32(a, b), ab_high = _mm512_unpackhi_epi32(a, b);
         const __m512i cd_low = _mm512_unpacklo_epi32(c, d), cd_high = _mm512_unpackhi_epi32(c, d);
         quad[i][0] = _mm512_unpacklo_epi64(ab_low, cd_low);
@@ -191,15 +198,14 @@ static inline float vf_sum(Vf a) {
     q = _mm_add_ps(q, _mm_movehl_ps(q, q));
     return _mm_cvtss_f32(_mm_add_ss(q, _mm_movehdup_ps(q)));
 }
-/* Appends ids[lane] (x[lane]) to out for every set lane, in lane order; may write up to 16 places; returns
- * how many count. */
-static inline int vi_compress(int32_t *out, const int32_t *ids, Vm m) {
+/* Appends the set lanes of v to out, in lane order; may write up to 16 places; returns how many count. */
+static inline int vi_compress(int32_t *out, Vi v, Vm m) {
     /* compress in the register, then store: compressing to memory is microcoded on Zen 4 */
-    _mm512_storeu_si512(out, _mm512_maskz_compress_epi32(m, _mm512_loadu_si512(ids)));
+    _mm512_storeu_si512(out, _mm512_maskz_compress_epi32(m, v));
     return __builtin_popcount(m);
 }
-static inline int vf_compress(float *out, const float *x, Vm m) {
-    _mm512_storeu_ps(out, _mm512_maskz_compress_ps(m, _mm512_loadu_ps(x)));
+static inline int vf_compress(float *out, Vf v, Vm m) {
+    _mm512_storeu_ps(out, _mm512_maskz_compress_ps(m, v));
     return __builtin_popcount(m);
 }
 
@@ -232,6 +238,9 @@ static inline Vf vf_add(Vf u, Vf v) {
 }
 static inline Vf vf_sub(Vf u, Vf v) {
     return VF(_mm256_sub_ps(u.a, v.a), _mm256_sub_ps(u.b, v.b));
+}
+static inline Vf vf_max(Vf u, Vf v) {
+    return VF(_mm256_max_ps(u.a, v.a), _mm256_max_ps(u.b, v.b));
 }
 static inline Vf vf_mul(Vf u, Vf v) {
     return VF(_mm256_mul_ps(u.a, v.a), _mm256_mul_ps(u.b, v.b));
@@ -304,6 +313,10 @@ static inline Vi vi_round(Vf v) {
 static inline Vf vf_from_int(Vi v) {
     return VF(_mm256_cvtepi32_ps(v.a), _mm256_cvtepi32_ps(v.b));
 }
+static inline Vi vi_select(Vm m, Vi yes, Vi no) {
+    return (Vi){_mm256_blendv_epi8(no.a, yes.a, vm_expand(m)),
+                _mm256_blendv_epi8(no.b, yes.b, vm_expand(m >> 8))};
+}
 static inline void vf_store_i16(int16_t *p, Vf v) {
     vi_store_i16(p, (Vi){_mm256_cvtps_epi32(v.a), _mm256_cvtps_epi32(v.b)});
 }
@@ -366,16 +379,20 @@ static inline float vf_sum(Vf v) {
     q = _mm_add_ps(q, _mm_movehl_ps(q, q));
     return _mm_cvtss_f32(_mm_add_ss(q, _mm_movehdup_ps(q)));
 }
-static inline int vi_compress(int32_t *out, const int32_t *ids, Vm m) {
+static inline int vi_compress(int32_t *out, Vi v, Vm m) {
+    int32_t lane[LANES];
+    vi_store(lane, v);
     int n = 0;
     for (; m != 0; m &= m - 1) /* few lanes are set: walking the bits beats a table of shuffles */
-        out[n++] = ids[__builtin_ctz(m)];
+        out[n++] = lane[__builtin_ctz(m)];
     return n;
 }
-static inline int vf_compress(float *out, const float *x, Vm m) {
+static inline int vf_compress(float *out, Vf v, Vm m) {
+    float lane[LANES];
+    vf_store(lane, v);
     int n = 0;
     for (; m != 0; m &= m - 1)
-        out[n++] = x[__builtin_ctz(m)];
+        out[n++] = lane[__builtin_ctz(m)];
     return n;
 }
 
@@ -409,6 +426,10 @@ static inline Vf vf_add(Vf a, Vf b) {
 }
 static inline Vf vf_sub(Vf a, Vf b) {
     EACH_LANE a.v[l] -= b.v[l];
+    return a;
+}
+static inline Vf vf_max(Vf a, Vf b) {
+    EACH_LANE a.v[l] = a.v[l] > b.v[l] ? a.v[l] : b.v[l];
     return a;
 }
 static inline Vf vf_mul(Vf a, Vf b) {
@@ -487,6 +508,10 @@ static inline Vf vf_from_int(Vi a) {
     EACH_LANE r.v[l] = (float)a.v[l];
     return r;
 }
+static inline Vi vi_select(Vm m, Vi yes, Vi no) {
+    EACH_LANE no.v[l] = m >> l & 1 ? yes.v[l] : no.v[l];
+    return no;
+}
 static inline void vf_store_i16(int16_t *p, Vf a) {
     EACH_LANE p[l] = (int16_t)lrintf(a.v[l]);
 }
@@ -536,16 +561,16 @@ static inline float vf_sum(Vf a) {
             a.v[l] += a.v[l + width];
     return a.v[0];
 }
-static inline int vi_compress(int32_t *out, const int32_t *ids, Vm m) {
+static inline int vi_compress(int32_t *out, Vi v, Vm m) {
     int n = 0;
     for (; m != 0; m &= m - 1)
-        out[n++] = ids[__builtin_ctz(m)];
+        out[n++] = v.v[__builtin_ctz(m)];
     return n;
 }
-static inline int vf_compress(float *out, const float *x, Vm m) {
+static inline int vf_compress(float *out, Vf v, Vm m) {
     int n = 0;
     for (; m != 0; m &= m - 1)
-        out[n++] = x[__builtin_ctz(m)];
+        out[n++] = v.v[__builtin_ctz(m)];
     return n;
 }
 #undef EACH_LANE
@@ -555,10 +580,10 @@ static inline int vf_compress(float *out, const float *x, Vm m) {
 /* ---- On top of the above, the same text on every path ---- */
 
 #ifndef SIMD_AVX512
-static inline void vi_transpose16(const int32_t *rows, int stride, int32_t out[LANES][LANES]) {
+static inline void vi_transpose16(const int32_t *const rows[LANES], int from, int32_t out[LANES][LANES]) {
     for (int k = 0; k < LANES; k++)
         for (int l = 0; l < LANES; l++)
-            out[k][l] = rows[l * stride + k];
+            out[k][l] = rows[l][from + k];
 }
 #endif
 
@@ -573,15 +598,15 @@ static inline Vi vi_lane(void) {
     return vi_load(lane);
 }
 
-/* 1 / sqrt(a), relative error below 3e-7 for normal a > 0: the bit trick of [Lomont 2003] and three Newton
- * steps. A division and a square root take three times as long, and the machines' own estimates differ from
- * vendor to vendor. */
+/* 1 / sqrt(a), relative error below 5e-7 for normal a > 0: a seed by the bits and two Newton steps whose
+ * constants share the error out on both sides [Moroz, Walczyk et al. 2018; the last constant by search]. A
+ * division and a square root take three times as long, and the machines' own estimates differ from vendor to
+ * vendor. */
 static inline Vf vf_rsqrt(Vf a) {
-    const Vf half = vf_mul(a, vf_set(0.5f)), three_halves = vf_set(1.5f);
-    Vf y = vf_rsqrt_seed(a, 0x5f375a86);
-    for (int k = 0; k < 3; k++)
-        y = vf_mul(y, vf_fnma(vf_mul(half, y), y, three_halves));
-    return y;
+    const Vf half = vf_mul(a, vf_set(0.5f)), seed = vf_rsqrt_seed(a, 0x5f1ffff9);
+    const Vf y =
+        vf_mul(vf_mul(vf_set(0.703952253f), seed), vf_fnma(vf_mul(a, seed), seed, vf_set(2.38924456f)));
+    return vf_mul(y, vf_fnma(vf_mul(half, y), y, vf_set(1.50000036f)));
 }
 
 #endif

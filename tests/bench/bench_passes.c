@@ -129,6 +129,9 @@ int main(int argc, char **argv) {
     Tank tank = {.kernel = kernel_make(0.1), .volume = 1e-4f, .passes = best_passes()};
     const GridBounds domain = {{-1, -1, -1}, {1e4f, 1e4f, 1e4f}};
     if (!tank_make(&tank, edge, layers, &err) ||
+        /* the second sort knows the rows of the first search, as every step knows those of the last */
+        !grid_sort(&tank.grid, &tank.particles, tank.kernel.support, &domain, NULL, 1, &err) ||
+        !tank_search(&tank, 1, &err) ||
         !grid_sort(&tank.grid, &tank.particles, tank.kernel.support, &domain, NULL, 1, &err)) {
         fprintf(stderr, "%s\n", err.message);
         return 1;
