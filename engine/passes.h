@@ -220,15 +220,17 @@ typedef struct ForceJob {
     Float4 *result;         /* out: velocity + gravity_dt - viscosity sum_j V W_ij (v_i - v_j) */
     float gravity_dt[3];
     float viscosity;
-    float calming;       /* share of the velocity that is no part of a linear field taken away; 0: none */
-    float calming_limit; /* m/s: at most this of the difference between two particles */
-    const Float4 *gradient[3]; /* calming: A_i h, column by column, from `strain` */
+    float calming;           /* share of the velocity that is no part of a linear field taken away; 0: none */
+    float calming_limit;     /* m/s: at most this of the difference between two particles */
+    const Float4 *strain[2]; /* calming: of `strain` */
 } ForceJob;
 
 typedef struct StrainJob {
     const PairData *pairs;
     const Float4 *velocity;
-    Float4 *gradient[3]; /* out: columns of A_i h, m/s: the linear field v + A (x - x_i) that fits best */
+    /* out: position and A_i h, m/s, of the linear field v + A (x - x_i) that fits best, as load_strain takes
+     * it apart */
+    Float4 *strain[2];
 } StrainJob;
 
 typedef struct Passes {

@@ -107,6 +107,20 @@ static inline Vf vf_from_int(Vi a) {
 static inline Vi vi_select(Vm m, Vi yes, Vi no) {
     return _mm512_mask_blend_epi32(m, no, yes);
 }
+/* Two numbers in the place of one, each rounded to its upper 16 bits (8 significant ones). */
+static inline Vf vf_pair(Vf high, Vf low) {
+    const __m512i half = _mm512_set1_epi32(0x8000), upper = _mm512_set1_epi32((int)0xffff0000u);
+    const __m512i h = _mm512_and_si512(_mm512_add_epi32(_mm512_castps_si512(high), half), upper);
+    const __m512i l = _mm512_srli_epi32(_mm512_add_epi32(_mm512_castps_si512(low), half), 16);
+    return _mm512_castsi512_ps(_mm512_or_si512(h, l));
+}
+static inline Vf vf_high(Vf pair) {
+    return _mm512_castsi512_ps(
+        _mm512_and_si512(_mm512_castps_si512(pair), _mm512_set1_epi32((int)0xffff0000u)));
+}
+static inline Vf vf_low(Vf pair) {
+    return _mm512_castsi512_ps(_mm512_slli_epi32(_mm512_castps_si512(pair), 16));
+}
 /* to nearest even; |a| <= 32767 */
 static inline void vf_store_i16(int16_t *p, Vf a) {
     vi_store_i16(p, _mm512_cvtps_epi32(a));
@@ -317,6 +331,23 @@ static inline Vi vi_select(Vm m, Vi yes, Vi no) {
     return (Vi){_mm256_blendv_epi8(no.a, yes.a, vm_expand(m)),
                 _mm256_blendv_epi8(no.b, yes.b, vm_expand(m >> 8))};
 }
+static inline __m256 avx2_pair(__m256 high, __m256 low) {
+    const __m256i half = _mm256_set1_epi32(0x8000), upper = _mm256_set1_epi32((int)0xffff0000u);
+    const __m256i h = _mm256_and_si256(_mm256_add_epi32(_mm256_castps_si256(high), half), upper);
+    const __m256i l = _mm256_srli_epi32(_mm256_add_epi32(_mm256_castps_si256(low), half), 16);
+    return _mm256_castsi256_ps(_mm256_or_si256(h, l));
+}
+static inline Vf vf_pair(Vf high, Vf low) {
+    return VF(avx2_pair(high.a, low.a), avx2_pair(high.b, low.b));
+}
+static inline Vf vf_high(Vf pair) {
+    const __m256 upper = _mm256_castsi256_ps(_mm256_set1_epi32((int)0xffff0000u));
+    return VF(_mm256_and_ps(pair.a, upper), _mm256_and_ps(pair.b, upper));
+}
+static inline Vf vf_low(Vf pair) {
+    return VF(_mm256_castsi256_ps(_mm256_slli_epi32(_mm256_castps_si256(pair.a), 16)),
+              _mm256_castsi256_ps(_mm256_slli_epi32(_mm256_castps_si256(pair.b), 16)));
+}
 static inline void vf_store_i16(int16_t *p, Vf v) {
     vi_store_i16(p, (Vi){_mm256_cvtps_epi32(v.a), _mm256_cvtps_epi32(v.b)});
 }
@@ -511,6 +542,29 @@ static inline Vf vf_from_int(Vi a) {
 static inline Vi vi_select(Vm m, Vi yes, Vi no) {
     EACH_LANE no.v[l] = m >> l & 1 ? yes.v[l] : no.v[l];
     return no;
+}
+static inline uint32_t float_bits(float a) {
+    uint32_t bits;
+    memcpy(&bits, &a, sizeof bits);
+    return bits;
+}
+static inline float float_of(uint32_t bits) {
+    float a;
+    memcpy(&a, &bits, sizeof a);
+    return a;
+}
+static inline Vf vf_pair(Vf high, Vf low) {
+    EACH_LANE high.v[l] =
+        float_of(((float_bits(high.v[l]) + 0x8000u) & 0xffff0000u) | (float_bits(low.v[l]) + 0x8000u) >> 16);
+    return high;
+}
+static inline Vf vf_high(Vf pair) {
+    EACH_LANE pair.v[l] = float_of(float_bits(pair.v[l]) & 0xffff0000u);
+    return pair;
+}
+static inline Vf vf_low(Vf pair) {
+    EACH_LANE pair.v[l] = float_of(float_bits(pair.v[l]) << 16);
+    return pair;
 }
 static inline void vf_store_i16(int16_t *p, Vf a) {
     EACH_LANE p[l] = (int16_t)lrintf(a.v[l]);
