@@ -3,6 +3,7 @@
  * the sort is stable and its result does not depend on the number of threads. */
 #include "grid.h"
 
+#include <assert.h>
 #include <math.h>
 #include <omp.h>
 
@@ -148,43 +149,29 @@ static void counting_sort(Grid *grid, const Particles *particles, const GridBoun
     }
 }
 
-/* Numbers of neighbours, or of near ones, from a row's size. Larger ones are rare, and wait together. */
-enum { LARGEST_KEY = 63 };
-
-static inline uint32_t row_key(uint32_t row_size, bool near) {
-    const uint32_t count = near ? row_size & 0xffffu : row_size >> 16;
-    return count < LARGEST_KEY ? count : LARGEST_KEY;
+/* Orders by neighbours, by near ones, by place: all different. */
+static inline int32_t row_key(uint32_t row_size, uint32_t place) {
+    static_assert(MAX_NEIGHBOURS < 512 && ROW_GROUP <= 8192, "three numbers in 31 bits");
+    return (int32_t)(((row_size >> 16) << 9 | (row_size & 0xffffu)) * ROW_GROUP + place);
 }
 
-/* Stable: members from[0, count) of a group go to `to` by their keys. */
-static void sort_group(const uint32_t *row_size, bool near, const uint16_t *from, uint16_t *to,
-                       uint32_t count) {
-    uint32_t next[LARGEST_KEY + 2] = {0};
-    for (uint32_t k = 0; k < count; k++)
-        next[row_key(row_size[from[k]], near) + 1]++;
-    for (int key = 1; key <= LARGEST_KEY; key++)
-        next[key] += next[key - 1];
-    for (uint32_t k = 0; k < count; k++)
-        to[next[row_key(row_size[from[k]], near)]++] = from[k];
-}
-
-/* Fills order, and turns member from where the particles are to where they will be. */
+/* Fills order, and turns member from where the particles are to where they will be. A particle's rank in its
+ * group is the number of those before it: few enough to compare all with all. */
 static void arrange_groups(Grid *grid, const Particles *particles, uint32_t kept, int threads) {
 #pragma omp parallel for schedule(static) num_threads(threads)
     for (uint32_t begin = 0; begin < kept; begin += ROW_GROUP) {
         const uint32_t count = kept - begin < ROW_GROUP ? kept - begin : ROW_GROUP;
-        uint32_t *member = grid->member + begin, row_size[ROW_GROUP];
-        uint16_t by_cell[ROW_GROUP], by_near[ROW_GROUP], by_all[ROW_GROUP];
+        uint32_t *member = grid->member + begin;
+        int32_t key[ROW_GROUP];
+        for (uint32_t k = 0; k < ROW_GROUP; k++)
+            key[k] = k < count ? row_key(particles->row_size[member[k]], k) : INT32_MAX;
         for (uint32_t k = 0; k < count; k++) {
-            row_size[k] = particles->row_size[member[k]];
-            by_cell[k] = (uint16_t)k;
+            int32_t rank = 0;
+            for (uint32_t other = 0; other < ROW_GROUP; other++)
+                rank += key[other] < key[k];
+            grid->order[begin + (uint32_t)rank] = member[k];
+            member[k] = begin + (uint32_t)rank;
         }
-        sort_group(row_size, true, by_cell, by_near, count);
-        sort_group(row_size, false, by_near, by_all, count);
-        for (uint32_t place = 0; place < count; place++)
-            grid->order[begin + place] = member[by_all[place]];
-        for (uint32_t place = 0; place < count; place++)
-            member[by_all[place]] = begin + place;
     }
 }
 
