@@ -30,6 +30,10 @@
 
 /* Diagonals below this belong to particles without a neighbour to push. */
 static const float MIN_DIAGONAL = 1e-6f;
+/* Water thinner than this, of rest, starts a solve without pressure. Two drops that barely touch have a tiny
+ * diagonal: the first step would cut the pressures of both by a huge amount, of which each one's residual
+ * knows only its own, and they went apart at thousands of m/s by the rest. */
+static const float THIN = 0.5f;
 /* The divergence solve leaves out particles with fewer neighbours: spray has no divergence to speak of. */
 enum { MIN_NEIGHBOURS = 20 };
 /* The two-sided residual goes this far below the one-sided tolerance, so that the usual error, measured at
@@ -377,12 +381,13 @@ static void prepare(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, f
             const bool held = problem->held != NULL && problem->held[i];
             still = still && held;
             const bool takes_part = i < count && gradient_sum[i][3] > MIN_DIAGONAL && !few && !held;
+            const bool is_thin = problem->rows->pairs.density[i] < THIN;
             const float lower = kind == SOLVE_SHIFT && pressure[i] > 0.0f ? -FLT_MAX : 0.0f;
             if (kind == SOLVE_SHIFT)
                 dfsph->lower[i] = lower;
             dfsph->inv_diagonal[i] = takes_part ? 1.0f / gradient_sum[i][3] : 0.0f;
             if (!held)
-                p[i] = takes_part && p[i] > lower ? warm * p[i] : 0.0f;
+                p[i] = takes_part && !is_thin && p[i] > lower ? warm * p[i] : 0.0f;
             dfsph->operand[i][3] = p[i];
             dfsph->source[i] = source_of(problem, kind, i);
         }
