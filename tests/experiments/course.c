@@ -102,7 +102,7 @@ static void sail_straight(Experiment *experiment) {
 static void sail_slalom(Experiment *experiment) {
     Course course = begin(experiment, "slalom");
     double port = 0.0, starboard = 0.0;
-    while (skiff_time(course.sim) < 38.0) {
+    while (skiff_time(course.sim) < 46.0) {
         advance(&course);
         port = fmin(port, degrees(course.drive.heading));
         starboard = fmax(starboard, degrees(course.drive.heading));
