@@ -128,23 +128,27 @@ static void hold_block(const uint8_t *held, const PairData *pairs, const Acceler
     }
 }
 
-/* The operand of D^T becomes p. */
+/* The operand of D^T becomes p, and what the divergence solve has found beside it. */
 static void set_operand(Dfsph *dfsph, const DfsphProblem *problem, const float *p) {
     const uint32_t blocks = particles_blocks(problem->particles);
+    const float *carried = dfsph->carried;
     EACH_BLOCK {
         for (uint32_t i = block * BLOCK; i < (block + 1) * BLOCK; i++)
-            dfsph->operand[i][3] = p[i];
+            dfsph->operand[i][3] = carried != NULL ? p[i] + carried[i] : p[i];
     }
 }
 
-/* result = base + scale D^T p for the fluid, response = D^T p for the bodies; p is the operand's. base NULL:
- * 0. */
+/* result = base + push + scale D^T p for the fluid, response = D^T p for the bodies; p is the operand's. base
+ * NULL: 0, and no push. */
 static void apply_transpose(Dfsph *dfsph, const DfsphProblem *problem, const Float4 *base, float scale,
                             Float4 *result) {
     const uint32_t blocks = particles_blocks(problem->particles);
     const PairData *pairs = dfsph->pairs;
-    const AccelerateJob job = {
-        .operand = (const Float4 *)dfsph->operand, .base = base, .scale = scale, .result = result};
+    const AccelerateJob job = {.operand = (const Float4 *)dfsph->operand,
+                               .base = base,
+                               .push = {dfsph->push[0], dfsph->push[1], dfsph->push[2]},
+                               .scale = scale,
+                               .result = result};
     EACH_BLOCK {
         if (base == NULL && dfsph->still[block])
             continue;
@@ -190,7 +194,7 @@ static void divergence_block(const Dfsph *dfsph, const DfsphProblem *problem, co
         subtract_bodies(problem->boundary, velocities, result, block);
 }
 
-/* result = velocity - D^T p / dt, p the operand's; the bodies' share stays in `response`. */
+/* result = velocity + push - D^T p / dt, p the operand's; the bodies' share stays in `response`. */
 static void apply_pressure(Dfsph *dfsph, const DfsphProblem *problem, Float4 *result) {
     apply_transpose(dfsph, problem, (const Float4 *)problem->particles->velocity,
                     -1.0f / problem->params->time_step, result);
@@ -383,28 +387,25 @@ static void prepare(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, f
             dfsph->inv_diagonal[i] = takes_part ? 1.0f / gradient_sum[i][3] : 0.0f;
             if (!held)
                 p[i] = takes_part && p[i] > lower ? warm * p[i] : 0.0f;
-            dfsph->operand[i][3] = p[i];
+            dfsph->operand[i][3] = dfsph->carried != NULL ? p[i] + dfsph->carried[i] : p[i];
             dfsph->source[i] = source_of(problem, kind, i);
         }
         dfsph->still[block] = still;
     }
 }
 
-/* Root mean square of the velocities without this step's gravity, in particle spacings a step. What is held
- * has no gravity to be taken out, and would seem to fall. */
+/* Root mean square of the velocities before this step's gravity, in particle spacings a step, of what is not
+ * held. */
 static double water_motion(const Dfsph *dfsph, const DfsphProblem *problem) {
     const uint32_t blocks = particles_blocks(problem->particles);
     const uint32_t count = problem->particles->count;
     const Float4 *velocity = (const Float4 *)problem->particles->velocity;
-    const float dt = problem->params->time_step, *gravity = problem->params->gravity;
     EACH_BLOCK {
         double sum = 0.0;
         const uint32_t end = (block + 1) * BLOCK < count ? (block + 1) * BLOCK : count;
         for (uint32_t i = block * BLOCK; i < end; i++)
-            for (int k = 0; k < 3 && !(problem->held != NULL && problem->held[i]); k++) {
-                const float v = velocity[i][k] - dt * gravity[k];
-                sum += (double)(v * v);
-            }
+            for (int k = 0; k < 3 && !(problem->held != NULL && problem->held[i]); k++)
+                sum += (double)(velocity[i][k] * velocity[i][k]);
         dfsph->partials[block * DFSPH_SUMS] = sum;
     }
     double total;
@@ -544,9 +545,10 @@ static SolveResult solve_jacobi(Dfsph *dfsph, const DfsphProblem *problem, float
             const uint32_t end = (block + 1) * BLOCK;
             for (uint32_t i = block * BLOCK; i < end; i++) {
                 const float next = p[i] + relaxation * dfsph->residual[i] * dfsph->inv_diagonal[i];
-                p[i] = dfsph->operand[i][3] = next > 0.0f ? next : 0.0f;
+                p[i] = next > 0.0f ? next : 0.0f;
             }
         }
+        set_operand(dfsph, problem, p);
         if ((errors.one_sided <= limits.tolerance && iterations >= limits.min) || iterations >= limits.max)
             return (SolveResult){iterations, errors.one_sided, errors.two_sided};
     }
@@ -593,6 +595,10 @@ SolveResult dfsph_solve(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kin
     dfsph->moving = problem->body_count > 0 && problem->boundary->moving.samples.count != 0;
     dfsph->answering = kind != SOLVE_SHIFT;
     dfsph->shifting = kind == SOLVE_SHIFT;
+    dfsph->carried =
+        kind == SOLVE_DENSITY && !problem->density_alone ? problem->particles->pressure_divergence : NULL;
+    for (int k = 0; k < 3; k++)
+        dfsph->push[k] = first ? problem->params->time_step * problem->params->gravity[k] : 0.0f;
     if (dfsph->moving)
         memset(dfsph->response, 0, (1 + (size_t)problem->body_count) * sizeof *dfsph->response);
     prepare(dfsph, problem, kind, p);
@@ -600,6 +606,8 @@ SolveResult dfsph_solve(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kin
     const SolveResult result = problem->params->pressure_solver == SKIFF_SOLVER_JACOBI
                                    ? solve_jacobi(dfsph, problem, p, limits)
                                    : solve_gcr(dfsph, problem, p, limits);
+    if (kind == SOLVE_DIVERGENCE)
+        return result;
     if (kind == SOLVE_DENSITY || kind == SOLVE_SHIFT)
         predict_density(dfsph, problem);
     set_operand(dfsph, problem, p);

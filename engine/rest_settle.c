@@ -1,6 +1,6 @@
 /* Last stage of a fill: what was selected settles [Carensac2023 sec. 3.3]. And the fill as a whole.
  *
- * A step: search, (divergence solve,) gravity and viscosity, density solve, damping, motion: the solver's
+ * A step: search, viscosity, (divergence solve,) gravity and density solve, damping, motion: the solver's
  * own, but not calming: what settles is all disorder, and losing it every step means creeping to its place
  * where it could fall. Bodies are held. Errors are means over the active particles.
  *
@@ -390,6 +390,7 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
                                   .boundary = settle->boundary,
                                   .particles = settle->particles,
                                   .held = settle->held,
+                                  .density_alone = !params->rest_divergence,
                                   /* Beside water that stands still a tighter stop presses the new into it:
                                    * single particles left at 0.4 m/s where it is 0.16. */
                                   .settling = settle->held != NULL,
@@ -400,9 +401,9 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
     for (int step = 0; step < settle->steps && !calm; step++, fill->steps++) {
         if (!search(settle, first_id, err))
             return false;
+        forces_apply_fluid(&problem, settle->dfsph);
         if (params->rest_divergence)
             dfsph_solve(settle->dfsph, &problem, SOLVE_DIVERGENCE);
-        forces_apply_fluid(&problem, settle->dfsph);
         if (params->rest_settle != REST_SETTLE_CANDIDATES)
             part_pairs(settle);
         if (settle->held != NULL)

@@ -1,9 +1,11 @@
 /* ONE STEP, TOP TO BOTTOM. Read this first.
  *
  * [Carensac2023 alg. 2], with the pressure solves of dfsph.c:
- *   thrust and steering -> emit blocks -> move body samples -> sort -> search -> boundary terms -> divergence
- * solve -> gravity and viscosity -> density solve -> advance.
- * pressureSolver split has no divergence solve; its density solve is two, for velocities and for positions.
+ *   thrust and steering -> emit blocks -> move body samples -> sort -> search -> boundary terms -> viscosity
+ * -> divergence solve -> gravity and density solve -> advance. The paper has its divergence solve before
+ * viscosity. After it, nothing but gravity happens to the velocities until the density solve, and one
+ * application of the pressures' gradients serves both. pressureSolver split has no divergence solve; its
+ * density solve is two, for velocities and for positions.
  */
 #define _POSIX_C_SOURCE 200809L
 #include "sim.h"
@@ -106,9 +108,11 @@ static void solve_flow(SkiffSim *sim) {
 }
 
 static void solve_density(SkiffSim *sim) {
+    const DfsphProblem problem = step_problem(sim);
+    for (int b = 0; b < sim->body_count; b++)
+        body_push(&sim->bodies[b], sim->params.gravity, sim->time, (double)sim->params.time_step);
     if (splits(sim))
         solve_flow(sim);
-    const DfsphProblem problem = step_problem(sim);
     const SolveResult result = dfsph_solve(&sim->dfsph, &problem, splits(sim) ? SOLVE_SHIFT : SOLVE_DENSITY);
     sim->stats.density_iterations = result.iterations;
     sim->stats.residual_percent = 100.0 * result.residual;
@@ -283,8 +287,8 @@ bool skiff_step(SkiffSim *sim, Err *err) {
     PHASE_RUN(SORT, good = sort_particles(sim, err));
     PHASE_RUN(SEARCH, good = find_neighbours(sim, err));
     PHASE_RUN(BOUNDARY, good = add_boundary(sim, err));
-    PHASE_RUN(DIVERGENCE, solve_divergence(sim));
     PHASE_RUN(FORCES, apply_forces(sim));
+    PHASE_RUN(DIVERGENCE, solve_divergence(sim));
     PHASE_RUN(PRESSURE, solve_density(sim));
     PHASE_RUN(ADVANCE, measure_forces(sim); advance(sim); good = check(sim, err));
     PHASE_RUN(ABSORB, good = absorb_waves(sim, err));

@@ -229,15 +229,21 @@ static uint64_t all_bits(const Passes *passes, bool wide) {
     static Cloud cloud;
     cloud_make(&cloud, passes, wide);
     cloud_correct(&cloud, passes);
-    static Float4 acceleration[COUNT + BLOCK], corrected[COUNT + BLOCK], velocity[COUNT + BLOCK];
+    static Float4 acceleration[COUNT + BLOCK], corrected[COUNT + BLOCK], velocity[COUNT + BLOCK],
+        fields[2][COUNT + BLOCK];
     static float divergence[COUNT + BLOCK], corrected_divergence[COUNT + BLOCK];
     const ForceJob job = {.pairs = &cloud.rows.pairs,
                           .velocity = (const Float4 *)cloud.particles.velocity,
                           .result = velocity,
-                          .gravity_dt = {0, -0.03f, 0},
-                          .viscosity = 0.02f};
+                          .viscosity = 0.02f,
+                          .calming = 0.7f,
+                          .calming_limit = 0.1f,
+                          .strain = {(const Float4 *)fields[0], (const Float4 *)fields[1]}};
+    const StrainJob strain = {
+        .pairs = &cloud.rows.pairs, .velocity = job.velocity, .strain = {fields[0], fields[1]}};
     const AccelerateJob push = {.operand = (const Float4 *)cloud.operand,
                                 .base = (const Float4 *)cloud.particles.velocity,
+                                .push = {0.1f, -0.03f, 0.2f},
                                 .scale = -3.0f,
                                 .result = acceleration};
     AccelerateJob push_corrected = push;
@@ -248,8 +254,10 @@ static uint64_t all_bits(const Passes *passes, bool wide) {
                            corrected_divergence, block);
         passes->accelerate(&cloud.rows.pairs, &push, block);
         passes->divergence(&cloud.rows.pairs, (const Float4 *)cloud.particles.velocity, divergence, block);
-        passes->forces(&job, block);
+        passes->strain(&strain, block);
     }
+    for (uint32_t block = 0; block < particles_blocks(&cloud.particles); block++)
+        passes->forces(&job, block);
     const uint64_t hash =
         bits(cloud.rows.pairs.density, COUNT * sizeof(float)) * 3 +
         bits(cloud.rows.pairs.gradient_sum, COUNT * sizeof(Float4)) * 5 +
