@@ -310,19 +310,30 @@ static const float YIELD_TIME = 0.1f;
 /* What a density solve corrects: a share gamma of the density error, and the error that this step's motion
  * will add because D v is only the tangent. That is taken to be what the last step's motion added. Without it
  * a fast flow carries an error of 1 / gamma times a step's. */
-static float density_source(const SkiffParams *params, float density, float prediction, const float *v) {
+typedef struct DensitySource {
+    float softening;      /* gamma */
+    float feedforward;    /* share of last step's that is expected again */
+    float least_speed_sq; /* m^2/s^2: who moves less than a hundredth of the spacing a step has no curved
+                           * part to foresee, only noise to repeat */
+} DensitySource;
+
+static DensitySource density_source(const SkiffParams *params) {
+    const float least = 0.02f * params->particle_radius / params->time_step;
+    return (DensitySource){.softening = params->softening,
+                           .feedforward =
+                               params->pressure_solver != SKIFF_SOLVER_JACOBI ? params->feedforward : 0.0f,
+                           .least_speed_sq = least * least};
+}
+
+static inline float density_source_at(const DensitySource *source, float density, float prediction,
+                                      float speed_sq) {
     static const float LARGEST = 0.005f,
                        DENSE = 0.99f; /* near the surface neighbours come and go: nothing to learn there */
-    float expected = 0.0f;
-    /* who moves less than a hundredth of the spacing a step has no curved part to foresee, only noise to
-     * repeat */
-    const float least = 0.02f * params->particle_radius / params->time_step;
-    const bool moves = v[0] * v[0] + v[1] * v[1] + v[2] * v[2] > least * least;
-    if (moves && prediction > 0.0f && density > DENSE && params->pressure_solver != SKIFF_SOLVER_JACOBI)
-        expected = params->feedforward * (density - prediction);
+    const bool foresees = (speed_sq > source->least_speed_sq) & (prediction > 0.0f) & (density > DENSE);
+    float expected = foresees ? source->feedforward * (density - prediction) : 0.0f;
     expected = expected > LARGEST ? LARGEST : expected < -LARGEST ? -LARGEST : expected;
     const float patience = prediction < 0.0f ? 1.0f + prediction : 1.0f;
-    return patience * params->softening * (density - 1.0f) + expected;
+    return patience * source->softening * (density - 1.0f) + expected;
 }
 
 /* Density that the velocities found lead to: rho + dt D v, from the residual that is left. Drops that fly
@@ -345,14 +356,23 @@ static void predict_density(const Dfsph *dfsph, const DfsphProblem *problem) {
     }
 }
 
-/* What stands beside dt D v. Divergence and flow: where there is room to the rest density, approaching is no
- * fault: thin water falls together freely. */
-static float source_of(const DfsphProblem *problem, SolveKind kind, uint32_t i) {
-    const float density = problem->rows->pairs.density[i];
-    if (kind == SOLVE_DENSITY || kind == SOLVE_SHIFT)
-        return density_source(problem->params, density, problem->particles->prediction[i],
-                              problem->particles->velocity[i]);
-    return density < 1.0f ? density - 1.0f : 0.0f;
+/* What stands beside dt D v, of a slice. Divergence and flow: where there is room to the rest density,
+ * approaching is no fault: thin water falls together freely. */
+static void source_slice(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind,
+                         const DensitySource *terms, uint32_t first) {
+    float *source = dfsph->source + first;
+    const float *density = problem->rows->pairs.density + first;
+    if (kind == SOLVE_DIVERGENCE || kind == SOLVE_FLOW) {
+        EACH_LANE source[l] = density[l] < 1.0f ? density[l] - 1.0f : 0.0f;
+        return;
+    }
+    const float *prediction = problem->particles->prediction + first;
+    const Float4 *velocity = (const Float4 *)problem->particles->velocity + first;
+    EACH_LANE {
+        const float *v = velocity[l];
+        source[l] =
+            density_source_at(terms, density[l], prediction[l], v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    }
 }
 
 /* Share of the last solution to start from. */
@@ -360,37 +380,63 @@ static float warm_start(const SkiffParams *params, SolveKind kind) {
     return kind == SOLVE_DIVERGENCE ? params->warm_start_divergence : params->warm_start;
 }
 
-/* Inverse diagonal, 0 where a particle takes no part; source; bounds; pressure scaled to the warm start, also
- * as the operand. */
+/* Inverse diagonal, 0 where a particle takes no part; pressure scaled to the warm start, also as the operand;
+ * of a slice. */
+static void start_slice(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, float *pressure,
+                        uint32_t first) {
+    static const float NO_PRESSURE[SLICE];
+    static const uint8_t NONE_HELD[SLICE];
+    const float warm = warm_start(problem->params, kind);
+    const int least_neighbours = kind == SOLVE_DIVERGENCE ? MIN_NEIGHBOURS : 0;
+    const Float4 *gradient_sum = dfsph->pairs->gradient_sum + first;
+    const uint16_t *neighbours = problem->rows->neighbours + first;
+    const uint8_t *held = problem->held != NULL ? problem->held + first : NONE_HELD;
+    const float *carried = dfsph->carried != NULL ? dfsph->carried + first : NO_PRESSURE;
+    const float *lower = lower_of(dfsph, first);
+    float *p = pressure + first, *inv_diagonal = dfsph->inv_diagonal + first;
+    Float4 *operand = dfsph->operand + first;
+    EACH_LANE {
+        const float diagonal = gradient_sum[l][3];
+        const bool takes_part =
+            (diagonal > MIN_DIAGONAL) & (neighbours[l] >= least_neighbours) & (held[l] == 0);
+        inv_diagonal[l] = takes_part ? 1.0f / diagonal : 0.0f;
+        const float start = takes_part & (p[l] > lower[l]) ? warm * p[l] : 0.0f;
+        p[l] = held[l] != 0 ? p[l] : start;
+    }
+    EACH_LANE operand[l][3] = p[l] + carried[l];
+}
+
+/* Water under pressure may be pulled, too. */
+static void lower_block(Dfsph *dfsph, const float *pressure, uint32_t block) {
+    for (uint32_t i = block * BLOCK; i < (block + 1) * BLOCK; i++)
+        dfsph->lower[i] = pressure[i] > 0.0f ? -FLT_MAX : 0.0f;
+}
+
+static bool all_held(const uint8_t *held, uint32_t block) {
+    for (uint32_t i = block * BLOCK; held != NULL && i < (block + 1) * BLOCK; i++)
+        if (!held[i])
+            return false;
+    return held != NULL;
+}
+
+/* What a solve begins with. */
 static void prepare(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, float *p) {
     const uint32_t blocks = particles_blocks(problem->particles);
-    const uint32_t count = problem->particles->count;
-    const float warm = warm_start(problem->params, kind);
-    const Float4 *gradient_sum = dfsph->pairs->gradient_sum;
-    const float *pressure = problem->particles->pressure;
+    const DensitySource terms = density_source(problem->params);
     memset(dfsph->lower, 0, SLICE * sizeof *dfsph->lower);
     EACH_BLOCK {
+        const size_t begin = (size_t)block * BLOCK;
         /* other arrays may have lain here */
-        memset(dfsph->direction + (size_t)block * BLOCK, 0, BLOCK * sizeof(float));
-        memset(dfsph->image + (size_t)block * BLOCK, 0, BLOCK * sizeof(float));
-        memcpy(dfsph->operand + (size_t)block * BLOCK, problem->particles->position + (size_t)block * BLOCK,
-               BLOCK * sizeof(Float4));
-        bool still = problem->held != NULL;
-        for (uint32_t i = block * BLOCK; i < (block + 1) * BLOCK; i++) {
-            const bool few = kind == SOLVE_DIVERGENCE && problem->rows->neighbours[i] < MIN_NEIGHBOURS;
-            const bool held = problem->held != NULL && problem->held[i];
-            still = still && held;
-            const bool takes_part = i < count && gradient_sum[i][3] > MIN_DIAGONAL && !few && !held;
-            const float lower = kind == SOLVE_SHIFT && pressure[i] > 0.0f ? -FLT_MAX : 0.0f;
-            if (kind == SOLVE_SHIFT)
-                dfsph->lower[i] = lower;
-            dfsph->inv_diagonal[i] = takes_part ? 1.0f / gradient_sum[i][3] : 0.0f;
-            if (!held)
-                p[i] = takes_part && p[i] > lower ? warm * p[i] : 0.0f;
-            dfsph->operand[i][3] = dfsph->carried != NULL ? p[i] + dfsph->carried[i] : p[i];
-            dfsph->source[i] = source_of(problem, kind, i);
+        memset(dfsph->direction + begin, 0, BLOCK * sizeof(float));
+        memset(dfsph->image + begin, 0, BLOCK * sizeof(float));
+        memcpy(dfsph->operand + begin, problem->particles->position + begin, BLOCK * sizeof(Float4));
+        if (dfsph->shifting)
+            lower_block(dfsph, problem->particles->pressure, block);
+        EACH_SLICE {
+            start_slice(dfsph, problem, kind, p, first);
+            source_slice(dfsph, problem, kind, &terms, first);
         }
-        dfsph->still[block] = still;
+        dfsph->still[block] = all_held(problem->held, block);
     }
 }
 

@@ -76,7 +76,7 @@ void forces_apply_fluid(const DfsphProblem *problem, Dfsph *dfsph) {
                               .strain = {dfsph->answer, dfsph->spare}};
     const ForceJob job = {.pairs = &problem->rows->pairs,
                           .velocity = (const Float4 *)particles->velocity,
-                          .result = dfsph->guess,
+                          .result = particles->back[PARTICLE_velocity].data,
                           .viscosity = params->viscosity,
                           .calming = params->calming,
                           .calming_limit = dt * params->calming_limit,
@@ -93,10 +93,11 @@ void forces_apply_fluid(const DfsphProblem *problem, Dfsph *dfsph) {
         for (uint32_t block = 0; block < blocks; block++)
             problem->passes->forces(&job, block);
 #pragma omp for schedule(static)
-        for (uint32_t i = 0; i < particles->count; i++)
-            if (problem->held == NULL || !problem->held[i])
-                memcpy(particles->velocity[i], dfsph->guess[i], sizeof(Float4));
+        for (uint32_t i = 0; i < (problem->held != NULL ? particles->count : 0); i++)
+            if (problem->held[i])
+                memcpy(job.result[i], particles->velocity[i], sizeof(Float4));
     }
+    particles_swap(particles, PARTICLE_velocity);
 }
 
 void forces_apply(SkiffSim *sim, const DfsphProblem *problem) {
