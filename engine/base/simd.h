@@ -410,21 +410,40 @@ static inline float vf_sum(Vf v) {
     q = _mm_add_ps(q, _mm_movehl_ps(q, q));
     return _mm_cvtss_f32(_mm_add_ss(q, _mm_movehdup_ps(q)));
 }
+/* Four lanes at a time, by a table of byte shuffles: walking the bits costs a wrong guess of their number. */
+#define BYTES(lane) 4 * (lane), 4 * (lane) + 1, 4 * (lane) + 2, 4 * (lane) + 3
+static const uint8_t avx2_compress_bytes[16][16] = {
+    {0},
+    {BYTES(0)},
+    {BYTES(1)},
+    {BYTES(0), BYTES(1)},
+    {BYTES(2)},
+    {BYTES(0), BYTES(2)},
+    {BYTES(1), BYTES(2)},
+    {BYTES(0), BYTES(1), BYTES(2)},
+    {BYTES(3)},
+    {BYTES(0), BYTES(3)},
+    {BYTES(1), BYTES(3)},
+    {BYTES(0), BYTES(1), BYTES(3)},
+    {BYTES(2), BYTES(3)},
+    {BYTES(0), BYTES(2), BYTES(3)},
+    {BYTES(1), BYTES(2), BYTES(3)},
+    {BYTES(0), BYTES(1), BYTES(2), BYTES(3)},
+};
+#undef BYTES
 static inline int vi_compress(int32_t *out, Vi v, Vm m) {
-    int32_t lane[LANES];
-    vi_store(lane, v);
+    const __m128i quads[4] = {_mm256_castsi256_si128(v.a), _mm256_extracti128_si256(v.a, 1),
+                              _mm256_castsi256_si128(v.b), _mm256_extracti128_si256(v.b, 1)};
     int n = 0;
-    for (; m != 0; m &= m - 1) /* few lanes are set: walking the bits beats a table of shuffles */
-        out[n++] = lane[__builtin_ctz(m)];
+    for (int q = 0; q < 4; q++, m >>= 4) {
+        const __m128i bytes = _mm_loadu_si128((const __m128i *)avx2_compress_bytes[m & 15]);
+        _mm_storeu_si128((__m128i *)(out + n), _mm_shuffle_epi8(quads[q], bytes));
+        n += __builtin_popcount(m & 15);
+    }
     return n;
 }
 static inline int vf_compress(float *out, Vf v, Vm m) {
-    float lane[LANES];
-    vf_store(lane, v);
-    int n = 0;
-    for (; m != 0; m &= m - 1)
-        out[n++] = lane[__builtin_ctz(m)];
-    return n;
+    return vi_compress((int32_t *)(void *)out, (Vi){_mm256_castps_si256(v.a), _mm256_castps_si256(v.b)}, m);
 }
 
 #else
