@@ -591,7 +591,7 @@ static void show(SkiffSim *sim, uint64_t first_id, bool all) {
     for (uint32_t i = 0; !all && i < sim->particles.count; i++)
         if (sim->particles.id[i] >= first_id)
             density[i] = 0.0f;
-    sim_add_pressures(sim);
+    sim_add_pressures(sim, sim->pressure.data);
 }
 
 bool rest_check_tile(SkiffSim *sim, Err *err) {
