@@ -133,7 +133,7 @@ static bool body_is_near(const SkiffSim *sim, const float p[3], float distance) 
     return false;
 }
 
-/* Particles [begin, end) of run 0 to 8 of the cells around cell c: three cells of a column each, the column
+/* Members [begin, end) of run 0 to 8 of the cells around cell c: three cells of a column each, the column
  * of the cell itself first. */
 static void cell_run(const CellGrid *grid, const int32_t c[3], int run, uint32_t *begin, uint32_t *end) {
     const int column = (run + 4) % 9;
@@ -157,6 +157,7 @@ static float distance_sq(const float p[3], const float q[3]) {
 static void try_inlet(const SkiffSim *sim, uint32_t index, float flow[4]) {
     const Sea *sea = &sim->sea;
     const CellGrid *grid = &sim->grid.cells;
+    const uint32_t *member = sim->grid.member;
     const Float4 *position = sim->particles.position;
     const float *p = sea->inlets[index];
     const float distance = sim->params.inflow_distance * sim->params.particle_radius;
@@ -169,17 +170,18 @@ static void try_inlet(const SkiffSim *sim, uint32_t index, float flow[4]) {
     for (int run = 0; run < 9; run++) {
         cell_run(grid, c, run, &begin, &end);
         for (uint32_t j = begin; j < end; j++)
-            if (distance_sq(p, position[j]) < distance * distance)
+            if (distance_sq(p, position[member[j]]) < distance * distance)
                 return;
     }
     for (int run = 0; run < 9; run++) {
         cell_run(grid, c, run, &begin, &end);
         for (uint32_t j = begin; j < end; j++) {
+            const uint32_t i = member[j];
             const double weight =
-                (double)(sim->volume * kernel_w(&sim->kernel, sqrtf(distance_sq(p, position[j]))));
+                (double)(sim->volume * kernel_w(&sim->kernel, sqrtf(distance_sq(p, position[i]))));
             weight_sum += weight;
             for (int k = 0; k < 3; k++)
-                sum[k] += weight * (double)sim->particles.velocity[j][k];
+                sum[k] += weight * (double)sim->particles.velocity[i][k];
         }
     }
     weight_sum += (double)p[3]; /* the walls, which stand still */

@@ -382,6 +382,7 @@ bool boundary_apply(Boundary *boundary, Rows *rows, const RowsJob *build, Err *e
     const BoundaryJob job = {.sets = {&boundary->fixed.sorted, &boundary->moving.sorted},
                              .position = (const Float4 *)particles->position,
                              .centres = (const Float4 *)boundary->centres,
+                             .member = build->grid->member,
                              .frozen = build->frozen,
                              .count = particles->count,
                              .kernel = rows->pairs.kernel,

@@ -53,7 +53,7 @@ static const double STEADY_SAFETY = 0.4;
 
 bool dfsph_reserve(Dfsph *dfsph, uint32_t particle_capacity, uint32_t object_count, Err *err) {
     const size_t padded = particle_capacity + BLOCK, blocks = padded / BLOCK;
-    const size_t bytes = padded * (5 * sizeof(Float4) + 7 * sizeof(float)) +
+    const size_t bytes = padded * (4 * sizeof(Float4) + 7 * sizeof(float)) +
                          blocks * (DFSPH_SUMS * sizeof(double) + 1) +
                          (size_t)object_count * 2 * sizeof *dfsph->response;
     if (!buffer_reserve(&dfsph->buffer, "pressure solver", bytes, err))
@@ -63,8 +63,7 @@ bool dfsph_reserve(Dfsph *dfsph, uint32_t particle_capacity, uint32_t object_cou
     TAKE(operand, padded);
     TAKE(guess, padded);
     TAKE(answer, padded);
-    TAKE(spare[0], padded);
-    TAKE(spare[1], padded);
+    TAKE(spare, padded);
     TAKE(partials, blocks * DFSPH_SUMS);
     TAKE(impulses, object_count);
     TAKE(response, object_count);

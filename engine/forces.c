@@ -71,10 +71,9 @@ void forces_apply_fluid(const DfsphProblem *problem, Dfsph *dfsph) {
     const SkiffParams *params = problem->params;
     const float dt = params->time_step;
     Particles *particles = problem->particles;
-    Float4 *gradient[3] = {dfsph->answer, dfsph->spare[0], dfsph->spare[1]};
     const StrainJob strain = {.pairs = &problem->rows->pairs,
                               .velocity = (const Float4 *)particles->velocity,
-                              .gradient = {gradient[0], gradient[1], gradient[2]}};
+                              .strain = {dfsph->answer, dfsph->spare}};
     const ForceJob job = {
         .pairs = &problem->rows->pairs,
         .velocity = (const Float4 *)particles->velocity,
@@ -83,7 +82,7 @@ void forces_apply_fluid(const DfsphProblem *problem, Dfsph *dfsph) {
         .viscosity = params->viscosity,
         .calming = params->calming,
         .calming_limit = dt * params->calming_limit,
-        .gradient = {(const Float4 *)gradient[0], (const Float4 *)gradient[1], (const Float4 *)gradient[2]}};
+        .strain = {(const Float4 *)dfsph->answer, (const Float4 *)dfsph->spare}};
     const uint32_t blocks = particles_blocks(particles);
 #pragma omp parallel num_threads(problem->threads)
     {

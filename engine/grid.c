@@ -1,8 +1,9 @@
-/* Counting sort of the particles by cell. Each thread counts and later moves one contiguous part of the
- * particles, and the parts are taken in order within a cell, so the sort is stable and its result does not
- * depend on the number of threads. */
+/* Counting sort of the particles by cell, and of groups of them by the size of their rows. Each thread counts
+ * and later moves one contiguous part of the particles, and the parts are taken in order within a cell, so
+ * the sort is stable and its result does not depend on the number of threads. */
 #include "grid.h"
 
+#include <assert.h>
 #include <math.h>
 #include <omp.h>
 
@@ -82,15 +83,22 @@ static bool grid_reserve(Grid *grid, const Particles *particles, size_t cells, i
         return false;
     if (!buffer_reserve(&grid->cell_buffer, "cells of particles", padded * sizeof(uint32_t), err) ||
         !buffer_reserve(&grid->unsorted_buffer, "cells before the sort", padded * sizeof(uint32_t), err) ||
+        !buffer_reserve(&grid->member_buffer, "particles by cell", padded * sizeof(uint32_t), err) ||
+        !buffer_reserve(&grid->point_buffer, "positions by cell", 3 * padded * sizeof(float), err) ||
         !buffer_reserve(&grid->order_buffer, "sort order", padded * sizeof(uint32_t), err))
         return false;
     grid->cell = grid->cell_buffer.data;
+    grid->member = grid->member_buffer.data;
+    grid->x = grid->point_buffer.data;
+    grid->y = grid->x + padded;
+    grid->z = grid->y + padded;
     grid->order = grid->order_buffer.data;
     grid->cells.start = grid->start_buffer.data;
     return true;
 }
 
-/* Fills cell, order and the starts; `outside` particles go to the cell after the last. */
+/* Fills cell, member (for now with where the particles are) and the starts; `outside` particles go to the
+ * cell after the last. */
 static void counting_sort(Grid *grid, const Particles *particles, const GridBounds *domain, bool check,
                           int parts) {
     const CellGrid *cells = &grid->cells;
@@ -134,10 +142,48 @@ static void counting_sort(Grid *grid, const Particles *particles, const GridBoun
             const uint32_t end = (uint32_t)((uint64_t)n * (part + 1) / parts);
             for (uint32_t i = (uint32_t)((uint64_t)n * part / parts); i < end; i++) {
                 const uint32_t k = histogram[unsorted[i]]++;
-                grid->order[k] = i;
+                grid->member[k] = i;
                 grid->cell[k] = unsorted[i];
             }
         }
+    }
+}
+
+/* Orders by neighbours, by near ones, by place: all different. */
+static inline int32_t row_key(uint32_t row_size, uint32_t place) {
+    static_assert(MAX_NEIGHBOURS < 512 && ROW_GROUP <= 8192, "three numbers in 31 bits");
+    return (int32_t)(((row_size >> 16) << 9 | (row_size & 0xffffu)) * ROW_GROUP + place);
+}
+
+/* Fills order, and turns member from where the particles are to where they will be. A particle's rank in its
+ * group is the number of those before it: few enough to compare all with all. */
+static void arrange_groups(Grid *grid, const Particles *particles, uint32_t kept, int threads) {
+#pragma omp parallel for schedule(static) num_threads(threads)
+    for (uint32_t begin = 0; begin < kept; begin += ROW_GROUP) {
+        const uint32_t count = kept - begin < ROW_GROUP ? kept - begin : ROW_GROUP;
+        uint32_t *member = grid->member + begin;
+        int32_t key[ROW_GROUP];
+        for (uint32_t k = 0; k < ROW_GROUP; k++)
+            key[k] = k < count ? row_key(particles->row_size[member[k]], k) : INT32_MAX;
+        for (uint32_t k = 0; k < count; k++) {
+            int32_t rank = 0;
+            for (uint32_t other = 0; other < ROW_GROUP; other++)
+                rank += key[other] < key[k];
+            grid->order[begin + (uint32_t)rank] = member[k];
+            member[k] = begin + (uint32_t)rank;
+        }
+    }
+}
+
+/* Positions in the order of cells; the slice after the last is read, too. */
+static void copy_points(Grid *grid, const Particles *particles, int threads) {
+    const uint32_t count = particles->count;
+#pragma omp parallel for schedule(static) num_threads(threads)
+    for (uint32_t k = 0; k < count + SLICE; k++) {
+        const float *p = particles->position[k < count ? grid->member[k] : k];
+        grid->x[k] = p[0];
+        grid->y[k] = p[1];
+        grid->z[k] = p[2];
     }
 }
 
@@ -177,13 +223,17 @@ bool grid_sort(Grid *grid, Particles *particles, float cell_size, const GridBoun
     counting_sort(grid, particles, domain, outside != 0, parts);
     if (removed != NULL)
         *removed = outside;
+    arrange_groups(grid, particles, particles->count - outside, threads);
     particles_permute(particles, grid->order, particles->count - outside, threads);
+    copy_points(grid, particles, threads);
     return true;
 }
 
 void grid_free(Grid *grid) {
     buffer_free(&grid->start_buffer);
     buffer_free(&grid->cell_buffer);
+    buffer_free(&grid->member_buffer);
+    buffer_free(&grid->point_buffer);
     buffer_free(&grid->order_buffer);
     buffer_free(&grid->unsorted_buffer);
     buffer_free(&grid->histogram_buffer);

@@ -27,18 +27,17 @@
 /* -(dW/dr) / r is largest at r = 0, where it is 2 l / h: see kernel.h. */
 static const float FACTOR_STEPS = 65535.0f / 2.0f;
 
-/* -(dW/dr) / r in units of l / h, which grad W is minus x_i - x_j times, and W. */
+/* -(dW/dr) / r in steps of l / h / FACTOR_STEPS, which grad W is minus x_i - x_j times, and W. What waits for
+ * the root is kept short: the search is a chain of these. */
 static inline void pair_kernel(const Kernel *kernel, Vf distance_sq, Vf *factor, Vf *weight) {
-    const Vf inv_r = vf_rsqrt(distance_sq);
-    const Vf q = vf_mul(vf_mul(distance_sq, inv_r), vf_set(kernel->inv_support));
-    const Vf p = vf_sub(vf_set(1.0f), q);
-    const Vm far = vf_less(vf_set(0.5f), q);
-    const Vf near_factor = vf_fnma(vf_set(3.0f), q, vf_set(2.0f));
-    const Vf far_factor = vf_mul(vf_mul(vf_set(kernel->support), vf_mul(p, p)), inv_r);
-    *factor = vf_select(far, far_factor, near_factor);
-    const Vf near_weight = vf_fma(vf_mul(vf_set(-6.0f), vf_mul(q, q)), p, vf_set(1.0f));
-    const Vf far_weight = vf_mul(vf_mul(p, p), vf_add(p, p));
-    *weight = vf_mul(vf_set(kernel->w_scale), vf_select(far, far_weight, near_weight));
+    const Vf steps = vf_set(FACTOR_STEPS), one = vf_set(1.0f);
+    const Vf q_sq = vf_mul(distance_sq, vf_set(kernel->inv_support * kernel->inv_support));
+    const Vf inv_q = vf_rsqrt(q_sq), q = vf_mul(q_sq, inv_q), p = vf_sub(one, q), p_sq = vf_mul(p, p);
+    const Vm far = vf_less(vf_set(0.25f), q_sq);
+    const Vf near_factor = vf_fnma(vf_set(3.0f * FACTOR_STEPS), q, vf_set(2.0f * FACTOR_STEPS));
+    *factor = vf_select(far, vf_mul(vf_mul(steps, inv_q), p_sq), near_factor);
+    const Vf near_weight = vf_fma(vf_mul(vf_set(-6.0f), q_sq), p, one);
+    *weight = vf_mul(vf_set(kernel->w_scale), vf_select(far, vf_mul(p_sq, vf_add(p, p)), near_weight));
 }
 
 static inline float near_distance_sq(const Kernel *kernel) {

@@ -120,6 +120,7 @@ uint32_t particles_append(Particles *particles, const float position[3], const f
     particles->pressure[i] = particles->pressure_divergence[i] = particles->prediction[i] = 0.0f;
     particles->id[i] = particles->next_id++;
     particles->birth[i] = birth;
+    particles->row_size[i] = 0;
     particles->edge[i] = EDGE_NONE;
     return i;
 }

@@ -28,6 +28,7 @@ typedef struct Particles {
     float *prediction;
     uint64_t *id;
     double *birth;
+    uint32_t *row_size;
     uint8_t *edge;
     Buffer front[PARTICLE_FIELD_COUNT], back[PARTICLE_FIELD_COUNT];
 } Particles;

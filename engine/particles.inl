@@ -7,4 +7,5 @@ PARTICLE_FIELD(pressure_divergence, float, 1, STATE_F32) /* the same of the dive
 PARTICLE_FIELD(prediction, float, 1, STATE_F32)          /* rho / rho0 that the last density solve expected now; 0: none; -1 to 0: set free lately, just now if -1 */
 PARTICLE_FIELD(id, uint64_t, 1, STATE_U64)               /* never reused */
 PARTICLE_FIELD(birth, double, 1, STATE_F64)              /* s */
+PARTICLE_FIELD(row_size, uint32_t, 1, STATE_U32)        /* fluid neighbours in the last search, all << 16 | near ones: the sort puts like beside like */
 PARTICLE_FIELD(edge, uint8_t, 1, STATE_U8)                /* of a window: ParticleEdge */

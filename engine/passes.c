@@ -278,18 +278,55 @@ static inline Vf vf_load_weight(const PairData *pairs, uint32_t entry) {
     return vf_load_i16(pairs->weights + (size_t)entry * SLICE);
 }
 
-/* Distances x_j - x_i of a slice's neighbours in units of the support radius. The weight of those that are
+/* Turns positions into distances x_j - x_i in units of the support radius. The weight of neighbours that are
  * not near becomes 0: the same for both of a pair, wherever they stand in their rows. */
-static inline void gather_arms(const PairData *pairs, uint32_t entry, const Float4 *slice_position,
-                               const Vf own[3], Vf arm[3], Vf *weight) {
-    Vf unused;
-    gather_neighbours(slice_position, pairs->entries, entry, pairs->wide, &arm[0], &arm[1], &arm[2], &unused);
+static inline void turn_to_arms(const PairData *pairs, const Vf own[3], Vf arm[3], Vf *weight) {
     for (int k = 0; k < 3; k++)
         arm[k] = vf_sub(arm[k], own[k]);
     const Vf distance_sq = vf_fma(arm[0], arm[0], vf_fma(arm[1], arm[1], vf_mul(arm[2], arm[2])));
     *weight = vf_mask(vf_less(distance_sq, vf_set(near_distance_sq(&pairs->kernel))), *weight);
     for (int k = 0; k < 3; k++)
         arm[k] = vf_mul(vf_set(pairs->kernel.inv_support), arm[k]);
+}
+
+/* A position, and A of sixteen particles: of its nine numbers as much as eight bits tell, so that two gathers
+ * fetch all of it. Both of a pair use the same rounded ones. */
+typedef struct Strain {
+    Vf x[3], a[9]; /* A column by column */
+} Strain;
+
+static inline void unpack_strain(Strain *strain, Vf first, const Vf rest[4]) {
+    Vf *a = strain->a;
+    a[0] = vf_high(first);
+    a[1] = vf_low(first);
+    for (int k = 0; k < 3; k++) {
+        a[2 + 2 * k] = vf_high(rest[k]);
+        a[3 + 2 * k] = vf_low(rest[k]);
+    }
+    a[8] = rest[3];
+}
+
+static inline void load_strain(const ForceJob *job, uint32_t first, Strain *strain) {
+    Vf pair, rest[4];
+    vf_load4(job->strain[0] + first, &strain->x[0], &strain->x[1], &strain->x[2], &pair);
+    vf_load4(job->strain[1] + first, &rest[0], &rest[1], &rest[2], &rest[3]);
+    unpack_strain(strain, pair, rest);
+}
+
+static inline void gather_strain(const ForceJob *job, uint32_t first, uint32_t entry, Strain *strain) {
+    const PairData *pairs = job->pairs;
+    Vf pair, rest[4];
+    gather_neighbours(job->strain[0] + first, pairs->entries, entry, pairs->wide, &strain->x[0],
+                      &strain->x[1], &strain->x[2], &pair);
+    gather_neighbours(job->strain[1] + first, pairs->entries, entry, pairs->wide, &rest[0], &rest[1],
+                      &rest[2], &rest[3]);
+    unpack_strain(strain, pair, rest);
+}
+
+static inline void store_strain(const StrainJob *job, uint32_t first, const Strain *strain) {
+    const Vf *a = strain->a;
+    vf_store4(job->strain[0] + first, strain->x[0], strain->x[1], strain->x[2], vf_pair(a[0], a[1]));
+    vf_store4(job->strain[1] + first, vf_pair(a[2], a[3]), vf_pair(a[4], a[5]), vf_pair(a[6], a[7]), a[8]);
 }
 
 /* A = [sum w (v_j - v_i) d^T] [sum w d d^T + small I]^-1, w = W_ij / W(0), d in supports. `small` keeps the
@@ -299,8 +336,9 @@ static void strain(const StrainJob *job, uint32_t block) {
     const Vf small = vf_set(0.008f * 32767.0f);
     for (uint32_t slice = block * BLOCK_SLICES; slice < (block + 1) * BLOCK_SLICES; slice++) {
         const uint32_t first = slice * SLICE, begin = pairs->slices[slice].start;
-        Vf own_x[3], own_v[3], unused;
-        vf_load4(pairs->position + first, &own_x[0], &own_x[1], &own_x[2], &unused);
+        Strain own;
+        Vf own_v[3], unused;
+        vf_load4(pairs->position + first, &own.x[0], &own.x[1], &own.x[2], &unused);
         vf_load4(job->velocity + first, &own_v[0], &own_v[1], &own_v[2], &unused);
         Vf xx = small, yy = small, zz = small, xy = vf_zero(), xz = vf_zero(), yz = vf_zero();
         Vf b[3][3];
@@ -312,7 +350,9 @@ static void strain(const StrainJob *job, uint32_t block) {
             prefetch_entry(pairs->entries, entry + PREFETCH_ENTRIES, pairs->wide);
             Vf d[3], v[3], wd[3];
             Vf weight = vf_load_weight(pairs, entry);
-            gather_arms(pairs, entry, pairs->position + first, own_x, d, &weight);
+            gather_neighbours(pairs->position + first, pairs->entries, entry, pairs->wide, &d[0], &d[1],
+                              &d[2], &unused);
+            turn_to_arms(pairs, own.x, d, &weight);
             gather_neighbours(job->velocity + first, pairs->entries, entry, pairs->wide, &v[0], &v[1], &v[2],
                               &unused);
             for (int k = 0; k < 3; k++) {
@@ -334,31 +374,27 @@ static void strain(const StrainJob *job, uint32_t block) {
         const Vf root = vf_rsqrt(adjugate(moments, c6));
         const Vf inv = vf_mul(root, root);
         const Vf columns[3][3] = {{c6[0], c6[3], c6[4]}, {c6[3], c6[1], c6[5]}, {c6[4], c6[5], c6[2]}};
-        for (int c = 0; c < 3; c++) {
-            Vf a[3];
+        for (int c = 0; c < 3; c++)
             for (int r = 0; r < 3; r++)
-                a[r] = vf_mul(inv, vf_fma(b[r][0], columns[c][0],
-                                          vf_fma(b[r][1], columns[c][1], vf_mul(b[r][2], columns[c][2]))));
-            vf_store4(job->gradient[c] + first, a[0], a[1], a[2], vf_zero());
-        }
+                own.a[3 * c + r] =
+                    vf_mul(inv, vf_fma(b[r][0], columns[c][0],
+                                       vf_fma(b[r][1], columns[c][1], vf_mul(b[r][2], columns[c][2]))));
+        store_strain(job, first, &own);
     }
 }
 
 /* Adds one neighbour's share of calming to sum: w min(1, limit / |e|) e, where e = v_i - v_j + (A_i + A_j) d
  * / 2 is what the two velocities differ by beyond the linear field between them. */
-static inline void calm_pair(const ForceJob *job, uint32_t entry, uint32_t first, const Vf own_x[3],
-                             const Vf own_a[3][3], Vf weight, Vf e[3], Vf sum[3]) {
-    const PairData *pairs = job->pairs;
-    Vf d[3], unused, size = vf_set(1e-12f);
-    gather_arms(pairs, entry, pairs->position + first, own_x, d, &weight);
-    const Vf half = vf_set(0.5f);
+static inline void calm_pair(const ForceJob *job, uint32_t entry, uint32_t first, const Strain *own,
+                             Vf weight, Vf e[3], Vf sum[3]) {
+    Strain other;
+    gather_strain(job, first, entry, &other);
+    turn_to_arms(job->pairs, own->x, other.x, &weight);
+    Vf size = vf_set(1e-12f);
     for (int c = 0; c < 3; c++) {
-        Vf a[3];
-        gather_neighbours(job->gradient[c] + first, pairs->entries, entry, pairs->wide, &a[0], &a[1], &a[2],
-                          &unused);
-        const Vf half_d = vf_mul(half, d[c]);
+        const Vf half_d = vf_mul(vf_set(0.5f), other.x[c]);
         for (int k = 0; k < 3; k++)
-            e[k] = vf_fma(vf_add(own_a[c][k], a[k]), half_d, e[k]);
+            e[k] = vf_fma(vf_add(own->a[3 * c + k], other.a[3 * c + k]), half_d, e[k]);
     }
     for (int k = 0; k < 3; k++)
         size = vf_fma(e[k], e[k], size);
@@ -398,16 +434,16 @@ static void forces(const ForceJob *job, uint32_t block) {
         const SliceRows *rows = &pairs->slices[slice];
         const uint32_t near_end = rows->start + (job->calming > 0.0f ? rows->near : 0);
         const uint32_t end = job->viscosity > 0.0f ? rows->start + rows->length : near_end;
-        Vf own_v[3], own_x[3], own_a[3][3], e[3], unused;
+        Vf own_v[3], e[3], unused;
+        Strain own = {0};
         Vf sum[3] = {vf_zero(), vf_zero(), vf_zero()}, calm_sum[3] = {vf_zero(), vf_zero(), vf_zero()};
         vf_load4(job->velocity + first, &own_v[0], &own_v[1], &own_v[2], &unused);
-        vf_load4(pairs->position + first, &own_x[0], &own_x[1], &own_x[2], &unused);
-        for (int c = 0; job->calming > 0.0f && c < 3; c++)
-            vf_load4(job->gradient[c] + first, &own_a[c][0], &own_a[c][1], &own_a[c][2], &unused);
+        if (job->calming > 0.0f)
+            load_strain(job, first, &own);
         uint32_t entry = rows->start;
         for (; entry < near_end; entry++) {
             const Vf weight = viscous_pair(job, entry, first, own_v, e, sum);
-            calm_pair(job, entry, first, own_x, own_a, weight, e, calm_sum);
+            calm_pair(job, entry, first, &own, weight, e, calm_sum);
         }
         for (; entry < end; entry++)
             viscous_pair(job, entry, first, own_v, e, sum);

@@ -1,9 +1,9 @@
 /* The hot loops: everything that visits particle pairs. One text (passes.c, search.c) compiled once per
  * instruction set; a table of functions each; all tables give the same bits.
  *
- * Particles are sorted by cell. Sixteen consecutive ones form a slice, 64 slices a block. A block is the unit
- * of scheduling and of summation: whatever thread runs it, it writes its own particles only, and sums over
- * particles are taken per block and then over the blocks in order. */
+ * Particles are sorted by cell, but see grid.h. Sixteen consecutive ones form a slice, 64 slices a block. A
+ * block is the unit of scheduling and of summation: whatever thread runs it, it writes its own particles
+ * only, and sums over particles are taken per block and then over the blocks in order. */
 #ifndef SKIFF_PASSES_H
 #define SKIFF_PASSES_H
 
@@ -17,6 +17,7 @@ enum {
     SLICE = LANES,     /* particles a slice */
     BLOCK_SLICES = 64, /* slices a block */
     BLOCK = SLICE * BLOCK_SLICES,
+    ROW_GROUP = 32,          /* particles that slices are filled from, see grid.h; a part of a block */
     MAX_NEIGHBOURS = 496,    /* fluid neighbours a particle may have; at rest it has 34 */
     MAX_CANDIDATES = 8192,   /* particles in the 27 cells around one */
     MAX_NEAR_SAMPLES = 4096, /* of walls, or of bodies, within a support radius of one cell */
@@ -89,9 +90,11 @@ typedef struct NearSamples {
 /* Scratch of one thread; too large for the stack. */
 typedef struct Scratch {
     float x[MAX_CANDIDATES + LANES], y[MAX_CANDIDATES + LANES], z[MAX_CANDIDATES + LANES];
-    int32_t halves[MAX_CANDIDATES + LANES]; /* places of the candidates as vf_gather4_i32 takes them */
-    int32_t list[SLICE][MAX_NEIGHBOURS + LANES];
-    int32_t far[MAX_NEIGHBOURS + LANES];
+    int32_t halves[MAX_CANDIDATES + LANES]; /* candidates as vf_gather4_i32 takes them */
+    /* neighbours of a group's particles, the near ones and in the end all; the far ones; where each begins */
+    int32_t lists[ROW_GROUP * (MAX_NEIGHBOURS + LANES) + 3 * LANES],
+        far[ROW_GROUP * MAX_NEIGHBOURS + 3 * LANES];
+    uint32_t list_start[ROW_GROUP], far_start[ROW_GROUP];
     NearSamples near[2]; /* walls, bodies */
     Contact contacts[BLOCK * MAX_CONTACT_OBJECTS];
 } Scratch;
@@ -146,8 +149,10 @@ typedef uint32_t RowAllocate(void *rows, int thread, uint32_t entries);
 
 typedef struct SearchJob {
     const CellGrid *grid;
-    const uint32_t *cell; /* cell of every particle */
-    int parts;            /* of a slab of cells, see Grid.apart; rows go to particles of the first */
+    /* in the order of cells, see Grid */
+    const uint32_t *cell, *member;
+    const float *points[3];
+    int parts; /* of a slab of cells, see Grid.apart; rows go to particles of the first */
     const Float4 *position;
     uint32_t count;
     Kernel kernel;
@@ -161,6 +166,7 @@ typedef struct SearchJob {
     float *density;
     Float4 *gradient_sum; /* sum_j V grad W_ij, 1/m; [3]: sum of their squares */
     uint16_t *neighbours;
+    uint32_t *row_size; /* see particles.inl */
     RowAllocate *allocate;
     void *rows;
 } SearchJob;
@@ -168,8 +174,9 @@ typedef struct SearchJob {
 typedef struct BoundaryJob {
     const SampleSet *sets[2]; /* walls, bodies */
     const Float4 *position;
-    const Float4 *centres; /* of every object */
-    const uint8_t *frozen; /* NULL, or [particles] 1: left out */
+    const Float4 *centres;  /* of every object */
+    const uint32_t *member; /* particles in the order of cells */
+    const uint8_t *frozen;  /* NULL, or [particles] 1: left out */
     uint32_t count;
     Kernel kernel;
     float *density;       /* NULL: list the contacts only */
@@ -213,15 +220,17 @@ typedef struct ForceJob {
     Float4 *result;         /* out: velocity + gravity_dt - viscosity sum_j V W_ij (v_i - v_j) */
     float gravity_dt[3];
     float viscosity;
-    float calming;       /* share of the velocity that is no part of a linear field taken away; 0: none */
-    float calming_limit; /* m/s: at most this of the difference between two particles */
-    const Float4 *gradient[3]; /* calming: A_i h, column by column, from `strain` */
+    float calming;           /* share of the velocity that is no part of a linear field taken away; 0: none */
+    float calming_limit;     /* m/s: at most this of the difference between two particles */
+    const Float4 *strain[2]; /* calming: of `strain` */
 } ForceJob;
 
 typedef struct StrainJob {
     const PairData *pairs;
     const Float4 *velocity;
-    Float4 *gradient[3]; /* out: columns of A_i h, m/s: the linear field v + A (x - x_i) that fits best */
+    /* out: position and A_i h, m/s, of the linear field v + A (x - x_i) that fits best, as load_strain takes
+     * it apart */
+    Float4 *strain[2];
 } StrainJob;
 
 typedef struct Passes {

@@ -73,6 +73,8 @@ bool rows_build(Rows *rows, const RowsJob *build, Err *err) {
         rows->neighbours = rows->neighbour_counts.data;
         const SearchJob job = {.grid = &build->grid->cells,
                                .cell = build->grid->cell,
+                               .member = build->grid->member,
+                               .points = {build->grid->x, build->grid->y, build->grid->z},
                                .parts = grid_parts(build->grid),
                                .position = (const Float4 *)particles->position,
                                .count = particles->count,
@@ -88,6 +90,7 @@ bool rows_build(Rows *rows, const RowsJob *build, Err *err) {
                                .density = rows->density.data,
                                .gradient_sum = rows->gradient_sum.data,
                                .neighbours = rows->neighbours,
+                               .row_size = particles->row_size,
                                .allocate = rows_allocate,
                                .rows = rows};
         uint32_t fault;

@@ -2,8 +2,8 @@
  * set.
  *
  * The 27 cells around a particle are nine runs of particles (eighteen where slabs of cells have two parts);
- * they are copied once a cell, and each of its particles keeps those within a support radius. Sixteen lists
- * become a slice's rows, with densities and sums of gradients on the way. */
+ * what is near the cell's own is copied once, and each of these keeps those within a support radius. The
+ * lists of a group become the rows of its slices, with densities and sums of gradients on the way. */
 #include "pair.h"
 
 /* ---- Neighbour search ---- */
@@ -14,29 +14,73 @@ typedef struct SearchCell {
     int candidate_count;
 } SearchCell;
 
-/* Copies the particles of the 27 cells around `cell` into scratch, run by run, and fills the last lanes with
- * points that are near nothing. Returns how many there are, -1 for too many. */
+/* How far coordinates are outside [low, high]. */
+static inline Vf beyond(Vf x, float low, float high) {
+    return vf_max(vf_max(vf_sub(vf_set(low), x), vf_sub(x, vf_set(high))), vf_zero());
+}
+
+/* A box, and what is near it. */
+typedef struct Reach {
+    float low[3], high[3], limit; /* m; of the square of the distance, m^2 */
+} Reach;
+
+/* With a margin for rounding: who is near is decided particle by particle. */
+static inline float reach_limit(const Kernel *kernel) {
+    return kernel->support * kernel->support * 1.001f;
+}
+
+static inline Vm within_reach(const Reach *reach, Vf x, Vf y, Vf z) {
+    const Vf d[3] = {beyond(x, reach->low[0], reach->high[0]), beyond(y, reach->low[1], reach->high[1]),
+                     beyond(z, reach->low[2], reach->high[2])};
+    return vf_less(vf_fma(d[0], d[0], vf_fma(d[1], d[1], vf_mul(d[2], d[2]))), vf_set(reach->limit));
+}
+
+/* Lanes that hold one of `left` values. */
+static inline Vm first_lanes(uint32_t left) {
+    return left >= LANES ? (Vm)0xffffu : (Vm)((1u << left) - 1u);
+}
+
+/* Around the points of a cell: they take up half of it. */
+static Reach cell_reach(const SearchJob *job, uint32_t cell) {
+    Reach reach = {.limit = reach_limit(&job->kernel)};
+    const uint32_t begin = job->grid->start[cell], end = job->grid->start[cell + 1];
+    for (int k = 0; k < 3; k++) {
+        const float *x = job->points[k];
+        float low = x[begin], high = low;
+        for (uint32_t j = begin + 1; j < end; j++) {
+            low = x[j] < low ? x[j] : low;
+            high = x[j] > high ? x[j] : high;
+        }
+        reach.low[k] = low;
+        reach.high[k] = high;
+    }
+    return reach;
+}
+
+/* Copies those particles of the 27 cells around `cell` that one of its own may feel into scratch, run by run,
+ * and fills the last lanes with points that are near nothing. Returns how many there are, -1 for too many. */
 static int gather_candidates(const SearchJob *job, uint32_t cell, Scratch *scratch) {
     const CellGrid *grid = job->grid;
     const int32_t column = grid->size[1], slab = grid->size[1] * grid->size[2];
+    const Reach reach = cell_reach(job, cell);
+    const float *const x = job->points[0], *const y = job->points[1], *const z = job->points[2];
+    const int32_t *member = (const int32_t *)job->member;
     int n = 0;
     for (int run = 0; run < 9 * job->parts; run++) {
         const int64_t slabs = (run / 3 % 3 - 1) * job->parts + run / 9;
         const int64_t middle = (int64_t)cell + slabs * slab + (run % 3 - 1) * column;
-        const uint32_t begin = grid->start[middle - 1], end = grid->start[middle + 2];
-        if (n + (int64_t)(end - begin) > MAX_CANDIDATES)
-            return -1;
-        for (uint32_t j = begin; j < end; j += LANES) {
-            Vf x, y, z, unused;
-            vf_load4(job->position + j, &x, &y, &z, &unused);
-            const int to = n + (int)(j - begin);
-            vf_store(scratch->x + to, x);
-            vf_store(scratch->y + to, y);
-            vf_store(scratch->z + to, z);
-            const Vi index = vi_add(vi_set((int32_t)j), vi_lane());
-            vi_store(scratch->halves + to, vi_add(index, index));
+        const uint32_t end = grid->start[middle + 2];
+        for (uint32_t j = grid->start[middle - 1]; j < end; j += LANES) {
+            const Vf p[3] = {vf_load(x + j), vf_load(y + j), vf_load(z + j)};
+            const Vi who = vi_load(member + j);
+            const Vm mine = (Vm)(within_reach(&reach, p[0], p[1], p[2]) & first_lanes(end - j));
+            if (n > MAX_CANDIDATES - LANES)
+                return -1;
+            vf_compress(scratch->x + n, p[0], mine);
+            vf_compress(scratch->y + n, p[1], mine);
+            vf_compress(scratch->z + n, p[2], mine);
+            n += vi_compress(scratch->halves + n, vi_add(who, who), mine);
         }
-        n += (int)(end - begin);
     }
     vf_store(scratch->x + n, vf_set(1e18f));
     return n;
@@ -46,31 +90,28 @@ typedef struct NeighbourCount {
     int all, near;
 } NeighbourCount;
 
-/* Neighbours of particle i in the order of the candidates, the near ones first; all is -1 when there are too
- * many. */
-static NeighbourCount find_neighbours(const SearchJob *job, int candidate_count, uint32_t i, Scratch *scratch,
-                                      int32_t *list) {
-    const Vf x = vf_set(job->position[i][0]), y = vf_set(job->position[i][1]),
-             z = vf_set(job->position[i][2]);
+/* Neighbours of the k-th particle in the order of cells, in the order of the candidates, the near ones apart;
+ * all is -1 when there are too many. */
+static NeighbourCount find_neighbours(const SearchJob *job, int candidate_count, uint32_t k, Scratch *scratch,
+                                      int32_t *list, int32_t *far_list) {
+    const Vf x = vf_set(job->points[0][k]), y = vf_set(job->points[1][k]), z = vf_set(job->points[2][k]);
     const Vf limit = vf_set(job->kernel.support * job->kernel.support);
     const Vf near_limit = vf_set(near_distance_sq(&job->kernel));
-    const Vi self = vi_set((int32_t)(2 * i));
+    const Vi self = vi_set((int32_t)(2 * job->member[k]));
     int near = 0, far = 0;
     for (int c = 0; c < candidate_count; c += LANES) {
         const Vf dx = vf_sub(x, vf_load(scratch->x + c));
         const Vf dy = vf_sub(y, vf_load(scratch->y + c));
         const Vf dz = vf_sub(z, vf_load(scratch->z + c));
+        const Vi halves = vi_load(scratch->halves + c);
         const Vf distance_sq = vf_fma(dx, dx, vf_fma(dy, dy, vf_mul(dz, dz)));
         const Vm is_near = vf_less(distance_sq, near_limit);
         const Vm is_far = vf_less(distance_sq, limit) & (Vm)~is_near;
-        const Vm is_self = vi_equal(vi_load(scratch->halves + c), self);
-        near += vi_compress(list + near, scratch->halves + c, is_near & (Vm)~is_self);
-        far += vi_compress(scratch->far + far, scratch->halves + c, is_far);
+        near += vi_compress(list + near, halves, is_near & (Vm)~vi_equal(halves, self));
+        far += vi_compress(far_list + far, halves, is_far);
         if (near + far > MAX_NEIGHBOURS)
             return (NeighbourCount){-1, 0};
     }
-    for (int k = 0; k < far; k += LANES)
-        vi_store(list + near + k, vi_load(scratch->far + k));
     return (NeighbourCount){near + far, near};
 }
 
@@ -83,85 +124,128 @@ static inline void entry_store_place(uint8_t *entries, uint32_t entry, bool wide
 
 /* What the passes read is the rounded factor, so the sums are made of it, too. */
 static inline Vf entry_store_factor(uint8_t *entries, uint32_t entry, bool wide, Vf factor) {
-    const Vi rounded = vi_round(vf_mul(factor, vf_set(FACTOR_STEPS)));
+    const Vi rounded = vi_round(factor);
     vi_store_i16((int16_t *)entry_factor(entries, entry, wide), rounded);
     return vf_from_int(rounded);
 }
 
-/* Turns the sixteen lists in scratch into row entries, densities and gradient sums. True if all offsets fit
- * 16 bits or wide. */
-static bool pack_slice(const SearchJob *job, uint32_t first, const int32_t counts[SLICE],
-                       const SliceRows *rows, const Scratch *scratch) {
+/* Neighbours k to k + 15 of a slice's particles; who has no more gets itself. */
+static void next_places(const int32_t *const lists[SLICE], Vi count, Vi own, int k,
+                        int32_t places[SLICE][SLICE]) {
+    vi_transpose16(lists, k, places);
+    for (int n = 0; n < SLICE; n++)
+        vi_store(places[n], vi_select(vi_less(vi_set(k + n), count), vi_load(places[n]), own));
+}
+
+/* Turns the lists of a slice's particles into row entries, densities and gradient sums. True if all offsets
+ * fit 16 bits or wide. */
+static bool pack_slice(const SearchJob *job, uint32_t first, const SliceRows *rows, const Scratch *scratch) {
+    const int32_t *lists[SLICE];
+    int32_t counts[SLICE];
+    for (uint32_t l = 0; l < SLICE; l++) {
+        const bool real = first + l < job->count;
+        lists[l] = scratch->lists + (real ? scratch->list_start[(first + l) % ROW_GROUP] : 0);
+        counts[l] = real ? (int32_t)(job->row_size[first + l] >> 16) : 0;
+    }
+    /* copies, as what is stored here could be anything, for all the compiler knows */
+    const Kernel kernel = job->kernel;
+    const Float4 *position = job->position;
+    uint8_t *entries = job->entries;
+    int16_t *weights = job->weights + (size_t)rows->start * SLICE;
+    const bool wide = job->wide;
     const Vi count = vi_load(counts), minus_first = vi_set(-2 * (int32_t)first);
+    const Vi own = vi_add(vi_set((int32_t)(2 * first)), vi_add(vi_lane(), vi_lane()));
+    const Vf weight_unit = vf_set(32767.0f / kernel.w_scale);
     Vf x, y, z, w;
-    vf_load4(job->position + first, &x, &y, &z, &w);
+    vf_load4(position + first, &x, &y, &z, &w);
     Vf sum_x = vf_zero(), sum_y = vf_zero(), sum_z = vf_zero(), sum_sq = vf_zero(), sum_w = vf_zero();
     Vm misfit = 0;
     int32_t halves[SLICE][SLICE]; /* of the next sixteen entries, from the first particle of all */
     uint32_t entry = rows->start;
     for (int k = 0; k < rows->length; k++, entry++) {
         if (k % SLICE == 0)
-            vi_transpose16(scratch->list[0] + k, MAX_NEIGHBOURS + LANES, halves);
+            next_places(lists, count, own, k, halves);
         const Vm valid = vi_less(vi_set(k), count);
         const Vi place = vi_add(vi_load(halves[k % SLICE]), minus_first);
         misfit |= vi_less(place, vi_set(INT16_MIN)) | vi_less(vi_set(INT16_MAX), place);
-        entry_store_place(job->entries, entry, job->wide, place);
+        entry_store_place(entries, entry, wide, place);
         Vf nx, ny, nz;
-        vf_gather4_i32(job->position, halves[k % SLICE], &nx, &ny, &nz, &w);
+        vf_gather4_i32(position, halves[k % SLICE], &nx, &ny, &nz, &w);
         const Vf dx = vf_sub(x, nx), dy = vf_sub(y, ny), dz = vf_sub(z, nz);
         const Vf distance_sq = vf_fma(dx, dx, vf_fma(dy, dy, vf_mul(dz, dz)));
         Vf factor, weight;
-        pair_kernel(&job->kernel, distance_sq, &factor, &weight);
-        factor = entry_store_factor(job->entries, entry, job->wide, vf_mask(valid, factor));
+        pair_kernel(&kernel, distance_sq, &factor, &weight);
+        factor = entry_store_factor(entries, entry, wide, vf_mask(valid, factor));
         sum_x = vf_fma(factor, dx, sum_x);
         sum_y = vf_fma(factor, dy, sum_y);
         sum_z = vf_fma(factor, dz, sum_z);
         sum_sq = vf_fma(vf_mul(factor, factor), distance_sq, sum_sq);
         weight = vf_mask(valid, weight);
         sum_w = vf_add(sum_w, weight);
-        vf_store_i16(job->weights + (size_t)entry * SLICE,
-                     vf_mul(weight, vf_set(32767.0f / job->kernel.w_scale)));
+        vf_store_i16(weights + (size_t)k * SLICE, vf_mul(weight, weight_unit));
     }
     const Vf unit = vf_set(-job->factor_unit), unit_sq = vf_mul(unit, unit);
     vf_store4(job->gradient_sum + first, vf_mul(unit, sum_x), vf_mul(unit, sum_y), vf_mul(unit, sum_z),
               vf_mul(unit_sq, sum_sq));
-    vf_store(job->density + first, vf_mul(vf_set(job->volume), vf_add(sum_w, vf_set(job->kernel.w_scale))));
-    return job->wide || misfit == 0;
+    vf_store(job->density + first, vf_mul(vf_set(job->volume), vf_add(sum_w, vf_set(kernel.w_scale))));
+    return wide || misfit == 0;
 }
 
-/* Lists the neighbours of a slice's particles in scratch, all to the length of the longest: what is missing
- * is the particle itself. all is -1, and *fault the particle, when one has too many. */
-static NeighbourCount list_neighbours(const SearchJob *job, uint32_t first, SearchCell *cell,
-                                      Scratch *scratch, int32_t counts[SLICE], uint32_t *fault) {
-    NeighbourCount most = {0, 0};
-    for (uint32_t l = 0; l < SLICE; l++) {
-        const uint32_t i = first + l;
-        counts[l] = 0;
-        if (i >= job->count)
-            continue;
+/* Lists the neighbours of a group's particles in scratch. False, and *fault the particle, when one has too
+ * many. */
+static bool list_group(const SearchJob *job, uint32_t begin, SearchCell *cell, Scratch *scratch,
+                       uint32_t *fault) {
+    const uint32_t end = begin + ROW_GROUP < job->count ? begin + ROW_GROUP : job->count;
+    uint32_t used = 0, far_used = 0;
+    for (uint32_t k = begin; k < end; k++) {
+        const uint32_t i = job->member[k];
+        scratch->list_start[i % ROW_GROUP] = used;
+        scratch->far_start[i % ROW_GROUP] = far_used;
         job->neighbours[i] = 0;
+        job->row_size[i] = 0;
         if (job->frozen != NULL && job->frozen[i])
             continue;
         NeighbourCount found = {-1, 0};
-        if (job->cell[i] != cell->index) {
-            cell->index = job->cell[i];
+        if (job->cell[k] != cell->index) {
+            cell->index = job->cell[k];
             cell->candidate_count = gather_candidates(job, cell->index, scratch);
         }
         if (cell->candidate_count >= 0)
-            found = find_neighbours(job, cell->candidate_count, i, scratch, scratch->list[l]);
+            found = find_neighbours(job, cell->candidate_count, k, scratch, scratch->lists + used,
+                                    scratch->far + far_used);
         if (found.all < 0) {
             *fault = i;
-            return found;
+            return false;
         }
-        counts[l] = found.all;
+        used += (uint32_t)found.all + LANES;
+        far_used += (uint32_t)(found.all - found.near);
         job->neighbours[i] = (uint16_t)found.all;
-        most.all = found.all > most.all ? found.all : most.all;
-        most.near = found.near > most.near ? found.near : most.near;
+        job->row_size[i] = (uint32_t)found.all << 16 | (uint32_t)found.near;
     }
-    for (uint32_t l = 0; l < SLICE; l++)
-        for (int k = counts[l]; k < most.all; k += LANES)
-            vi_store(scratch->list[l] + k, vi_set((int32_t)(2 * (first + l))));
-    return most;
+    return true;
+}
+
+/* Puts the far neighbours of a group's particles behind the near ones. Apart from the search, which is still
+ * writing what this reads. */
+static void join_group(const SearchJob *job, uint32_t begin, Scratch *scratch) {
+    for (uint32_t i = begin; i < begin + ROW_GROUP && i < job->count; i++) {
+        const int near = (int)(job->row_size[i] & 0xffffu), count = (int)(job->row_size[i] >> 16) - near;
+        const int32_t *from = scratch->far + scratch->far_start[i % ROW_GROUP];
+        int32_t *to = scratch->lists + scratch->list_start[i % ROW_GROUP] + near;
+        for (int k = 0; k < count; k += LANES)
+            vi_store(to + k, vi_load(from + k));
+    }
+}
+
+/* The longest row of a slice, and the most near neighbours. */
+static SliceRows slice_extent(const SearchJob *job, uint32_t first) {
+    SliceRows rows = {0};
+    for (uint32_t i = first; i < first + SLICE && i < job->count; i++) {
+        const uint16_t all = (uint16_t)(job->row_size[i] >> 16), near = (uint16_t)job->row_size[i];
+        rows.length = all > rows.length ? all : rows.length;
+        rows.near = near > rows.near ? near : rows.near;
+    }
+    return rows;
 }
 
 int PASSES_NAME(search_)(const SearchJob *job, uint32_t block, int thread, Scratch *scratch,
@@ -170,12 +254,13 @@ int PASSES_NAME(search_)(const SearchJob *job, uint32_t block, int thread, Scrat
     int status = SEARCH_OK;
     for (uint32_t slice = block * BLOCK_SLICES; slice < (block + 1) * BLOCK_SLICES; slice++) {
         const uint32_t first = slice * SLICE;
-        int32_t counts[SLICE];
-        const NeighbourCount found = list_neighbours(job, first, &cell, scratch, counts, fault);
-        if (found.all < 0)
-            return SEARCH_TOO_DENSE;
+        if (first % ROW_GROUP == 0) {
+            if (!list_group(job, first, &cell, scratch, fault))
+                return SEARCH_TOO_DENSE;
+            join_group(job, first, scratch);
+        }
         SliceRows *rows = &job->slices[slice];
-        *rows = (SliceRows){.length = (uint16_t)found.all, .near = (uint16_t)found.near};
+        *rows = slice_extent(job, first);
         if (first >= job->count) {
             for (uint32_t i = first; i < first + SLICE; i++) {
                 memset(job->gradient_sum[i], 0, sizeof(Float4));
@@ -186,7 +271,7 @@ int PASSES_NAME(search_)(const SearchJob *job, uint32_t block, int thread, Scrat
         rows->start = job->allocate(job->rows, thread, rows->length);
         if (rows->start == UINT32_MAX)
             return SEARCH_NEEDS_MEMORY;
-        if (!pack_slice(job, first, counts, rows, scratch))
+        if (!pack_slice(job, first, rows, scratch))
             status = SEARCH_NEEDS_WIDE;
     }
     return status;
@@ -229,7 +314,8 @@ static bool contact_add(const BoundaryJob *job, const NearSamples *near, int s, 
     const Vi object = vi_load(near->object + s);
     Vf factor, weight;
     pair_kernel(&job->kernel, distance_sq, &factor, &weight);
-    factor = vf_mul(vf_mul(factor, vf_set(-job->kernel.gradient_scale * job->kernel.inv_support)), volume);
+    const float unit = job->kernel.gradient_scale * job->kernel.inv_support / FACTOR_STEPS;
+    factor = vf_mul(vf_mul(factor, vf_set(-unit)), volume);
     weight = vf_mul(weight, volume);
     uint32_t left = in_reach;
     while (left != 0) {
@@ -254,42 +340,33 @@ static bool contact_add(const BoundaryJob *job, const NearSamples *near, int s, 
     return true;
 }
 
-/* How far coordinates are outside [low, high]. */
-static inline Vf beyond(Vf x, float low, float high) {
-    const Vf below = vf_sub(vf_set(low), x), above = vf_sub(x, vf_set(high)), zero = vf_zero();
-    const Vf out = vf_select(vf_less(below, above), above, below);
-    return vf_select(vf_less(out, zero), zero, out);
-}
-
 /* Copies together the samples within a support radius of a cell. False: there are too many. */
 static bool gather_samples(const BoundaryJob *job, const SampleSet *set, const int32_t c[3],
                            NearSamples *near) {
     const CellGrid *grid = &set->grid;
     const int32_t column = grid->size[1], slab = grid->size[1] * grid->size[2];
-    const float limit = job->kernel.support * job->kernel.support * 1.001f, edge = 1.0f / grid->inv_size;
-    float low[3];
-    for (int k = 0; k < 3; k++)
-        low[k] = grid->origin[k] + edge * (float)c[k];
+    const float edge = 1.0f / grid->inv_size;
+    Reach reach = {.limit = reach_limit(&job->kernel)};
+    for (int k = 0; k < 3; k++) {
+        reach.low[k] = grid->origin[k] + edge * (float)c[k];
+        reach.high[k] = reach.low[k] + edge;
+    }
     near->cell = cell_grid_index(grid, c[0], c[1], c[2]);
     near->count = 0;
     for (int run = 0; run < 9; run++) {
         const int32_t middle = near->cell + (run / 3 - 1) * slab + (run % 3 - 1) * column;
         const uint32_t end = grid->start[middle + 2];
         for (uint32_t s = grid->start[middle - 1]; s < end; s += LANES) {
-            const Vf d[3] = {beyond(vf_load(set->x + s), low[0], low[0] + edge),
-                             beyond(vf_load(set->y + s), low[1], low[1] + edge),
-                             beyond(vf_load(set->z + s), low[2], low[2] + edge)};
-            const Vf distance_sq = vf_fma(d[0], d[0], vf_fma(d[1], d[1], vf_mul(d[2], d[2])));
-            const uint32_t valid = end - s >= LANES ? 0xffffu : (1u << (end - s)) - 1u;
-            const Vm mine = (Vm)(vf_less(distance_sq, vf_set(limit)) & valid);
+            const Vf x = vf_load(set->x + s), y = vf_load(set->y + s), z = vf_load(set->z + s);
+            const Vm mine = (Vm)(within_reach(&reach, x, y, z) & first_lanes(end - s));
             const int to = near->count;
             if (to + __builtin_popcount(mine) > MAX_NEAR_SAMPLES)
                 return false;
-            vf_compress(near->x + to, set->x + s, mine);
-            vf_compress(near->y + to, set->y + s, mine);
-            vf_compress(near->z + to, set->z + s, mine);
-            vf_compress(near->volume + to, set->volume + s, mine);
-            near->count += vi_compress(near->object + to, set->object + s, mine);
+            vf_compress(near->x + to, x, mine);
+            vf_compress(near->y + to, y, mine);
+            vf_compress(near->z + to, z, mine);
+            vf_compress(near->volume + to, vf_load(set->volume + s), mine);
+            near->count += vi_compress(near->object + to, vi_load(set->object + s), mine);
         }
     }
     vf_store(near->x + near->count, vf_set(1e18f)); /* the last lanes are near nothing */
@@ -338,7 +415,8 @@ int PASSES_NAME(boundary_)(const BoundaryJob *job, uint32_t block, Scratch *scra
     int contact_count = 0;
     scratch->near[0].cell = scratch->near[1].cell = -1;
     const uint32_t begin = block * BLOCK, end = begin + BLOCK < job->count ? begin + BLOCK : job->count;
-    for (uint32_t i = begin; i < end; i++) {
+    for (uint32_t k = begin; k < end; k++) {
+        const uint32_t i = job->member[k];
         const bool shaped = job->density != NULL && job->shape[0] != NULL;
         for (int m = 0; shaped && m < 2; m++)
             memset(job->shape[m][i], 0, sizeof(Float4));
@@ -346,19 +424,19 @@ int PASSES_NAME(boundary_)(const BoundaryJob *job, uint32_t block, Scratch *scra
             continue;
         ContactSums sums;
         sums.count = 0;
-        for (int k = 0; k < 2; k++) {
-            if (job->sets[k]->count != 0 &&
-                !contacts_of_particle(job, job->sets[k], job->position[i], &scratch->near[k], &sums)) {
+        for (int s = 0; s < 2; s++) {
+            if (job->sets[s]->count != 0 &&
+                !contacts_of_particle(job, job->sets[s], job->position[i], &scratch->near[s], &sums)) {
                 *fault = i;
                 return -1;
             }
         }
         float g[3] = {0};
-        for (int k = 0; shaped && k < sums.count; k++)
+        for (int s = 0; shaped && s < sums.count; s++)
             for (int a = 0; a < 6; a++)
-                job->shape[a / 3][i][a % 3] += vf_sum(sums.sums[k].m[a]);
-        for (int k = 0; k < sums.count; k++) {
-            const ContactSum *sum = &sums.sums[k];
+                job->shape[a / 3][i][a % 3] += vf_sum(sums.sums[s].m[a]);
+        for (int s = 0; s < sums.count; s++) {
+            const ContactSum *sum = &sums.sums[s];
             Contact *contact = &scratch->contacts[contact_count++];
             contact->particle = i;
             contact->object = (uint32_t)sum->object;

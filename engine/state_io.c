@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { STATE_VERSION = 4, BODY_SCALARS = 3 + 4 + 3 + 3 };
+enum { STATE_VERSION = 5, BODY_SCALARS = 3 + 4 + 3 + 3 };
 
 static void body_to_scalars(const Body *body, double *out) {
     memcpy(out, body->position, 3 * sizeof(double));

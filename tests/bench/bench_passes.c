@@ -18,7 +18,7 @@ typedef struct Tank {
     Kernel kernel;
     float volume;
     const Passes *passes;
-    Float4 *operand, *vector, *gradient[3];
+    Float4 *operand, *vector, *strain[2];
     float *result;
 } Tank;
 
@@ -42,8 +42,8 @@ static bool tank_make(Tank *tank, int edge, int layers, Err *err) {
     tank->operand = aligned_alloc(64, padded * sizeof(Float4));
     tank->vector = aligned_alloc(64, padded * sizeof(Float4));
     tank->result = aligned_alloc(64, padded * sizeof(float));
-    for (int k = 0; k < 3; k++)
-        tank->gradient[k] = aligned_alloc(64, padded * sizeof(Float4));
+    for (int k = 0; k < 2; k++)
+        tank->strain[k] = aligned_alloc(64, padded * sizeof(Float4));
     return true;
 }
 
@@ -86,16 +86,14 @@ static void run_block(const Tank *tank, Pass pass, uint32_t block) {
         break;
     case STRAIN:
         tank->passes->strain(
-            &(StrainJob){.pairs = pairs,
-                         .velocity = velocity,
-                         .gradient = {tank->gradient[0], tank->gradient[1], tank->gradient[2]}},
+            &(StrainJob){.pairs = pairs, .velocity = velocity, .strain = {tank->strain[0], tank->strain[1]}},
             block);
         break;
     case CALMING:
         force.calming = 1.0f;
         force.calming_limit = 0.003f;
-        for (int k = 0; k < 3; k++)
-            force.gradient[k] = (const Float4 *)tank->gradient[k];
+        for (int k = 0; k < 2; k++)
+            force.strain[k] = (const Float4 *)tank->strain[k];
         tank->passes->forces(&force, block);
         break;
     default:
@@ -129,6 +127,9 @@ int main(int argc, char **argv) {
     Tank tank = {.kernel = kernel_make(0.1), .volume = 1e-4f, .passes = best_passes()};
     const GridBounds domain = {{-1, -1, -1}, {1e4f, 1e4f, 1e4f}};
     if (!tank_make(&tank, edge, layers, &err) ||
+        /* the second sort knows the rows of the first search, as every step knows those of the last */
+        !grid_sort(&tank.grid, &tank.particles, tank.kernel.support, &domain, NULL, 1, &err) ||
+        !tank_search(&tank, 1, &err) ||
         !grid_sort(&tank.grid, &tank.particles, tank.kernel.support, &domain, NULL, 1, &err)) {
         fprintf(stderr, "%s\n", err.message);
         return 1;
