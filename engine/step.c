@@ -118,8 +118,7 @@ static void solve_density(SkiffSim *sim) {
     sim->stats.residual_percent = 100.0 * result.residual;
 }
 
-void sim_add_pressures(SkiffSim *sim) {
-    float *total = sim->pressure.data;
+void sim_add_pressures(const SkiffSim *sim, float *total) {
     const Particles *particles = &sim->particles;
     const float unit = sim->params.rest_density / (sim->params.time_step * sim->params.time_step);
     const float second = splits(sim) ? 0.0f : 1.0f; /* what shifts particles is no pressure */
@@ -130,8 +129,8 @@ void sim_add_pressures(SkiffSim *sim) {
 
 /* Pressure of this step and the forces of the fluid on tank and bodies. */
 static void measure_forces(SkiffSim *sim) {
-    sim_add_pressures(sim);
-    const float *total = sim->pressure.data;
+    float *total = sim->pressure.data;
+    sim_add_pressures(sim, total);
     const Particles *particles = &sim->particles;
     double(*forces)[6] = sim->object_forces.data;
     boundary_impulse(&sim->boundary, total, 1, particles_blocks(particles), forces, sim->threads);
