@@ -351,6 +351,20 @@ static void write_fig4c_charts(FILE *out, const Reproduction *run) {
     fputs("</div>\n", out);
 }
 
+/* Whose method the fills' rows follow. */
+static void write_method(FILE *out, const Reproduction *run) {
+    const bool has_table = wants(run, CARENSAC_TABLE1);
+    if (!has_table && !wants(run, CARENSAC_FIG2))
+        return;
+    fputs(
+        "<p>In fills, rows with the paper's name follow its method: only particles near solids and existing "
+        "water settle, for at most ten steps, and nothing is calmed afterwards either.",
+        out);
+    if (has_table && !run->args->paper_only)
+        fputs(" Rows named <i>defaults</i> are what the program does by itself.", out);
+    fputs("</p>\n", out);
+}
+
 static bool write_page(const Reproduction *run, Err *err) {
     char path[4200];
     FileWriter writer;
@@ -369,12 +383,7 @@ static bool write_page(const Reproduction *run, Err *err) {
         fprintf(out,
                 "<p>Particles of radius %g m where the paper has %g m: a quick look, not a comparison.</p>\n",
                 reproduce_radius(run->args), CARENSAC_RADIUS);
-    if (wants(run, CARENSAC_TABLE1) || wants(run, CARENSAC_FIG2))
-        fputs("<p>In fills, rows with the paper's name follow its method: only particles near solids and "
-              "existing water "
-              "settle, for at most ten steps, and nothing is calmed afterwards either. Rows named "
-              "<i>defaults</i> are what the program does by itself.</p>\n",
-              out);
+    write_method(out, run);
     for (int s = 0; s < CARENSAC_SHEET_COUNT; s++) {
         if (!wants(run, (CarensacSheet)s))
             continue;

@@ -20,7 +20,7 @@ static const char header[] = "t,closed_energy,absorbing_energy,closed_particles,
 static const char *const side_names[SIDE_COUNT] = {"closed end", "absorbing end"};
 
 static const double standard_duration = 6.6;
-static const double outflow_layer = 0.5, inflow_layer = 0.2; /* m, of the scene */
+static const double layer = 0.5; /* m, in which the scene absorbs */
 /* Between these times (s) the closed half has its least energy, while its first wave stands at the end. The
  * wave is back ("at around 2.1 s") within `reflection_span` of that. */
 static const double turn_from = 1.5, turn_to = 2.2, reflection_span = 0.8;
@@ -29,9 +29,9 @@ static const double end_time = 5.9, end_span = 0.1; /* s; means over the span ar
 static Scene *load(const ReproduceJob *job, Err *err) {
     const double radius = reproduce_radius(job->args);
     char texts[2][64];
-    /* the layers keep their thickness, whatever the particles' size */
-    snprintf(texts[0], sizeof texts[0], "outflowDistance=%.9g", outflow_layer / radius);
-    snprintf(texts[1], sizeof texts[1], "inflowLayer=%.9g", inflow_layer / radius);
+    /* it keeps its thickness, whatever the particles' size */
+    snprintf(texts[0], sizeof texts[0], "outflowDistance=%.9g", layer / radius);
+    snprintf(texts[1], sizeof texts[1], "inflowLayer=%.9g", layer / radius);
     const char *const edits[] = {texts[0], texts[1]};
     return reproduce_scene(job, "wedge.json", standard_duration, edits, 2, err);
 }

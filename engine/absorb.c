@@ -6,13 +6,35 @@
  * have moved by one step since: far less than the cells' slack. */
 #include "sim.h"
 
+#include "base/random.h"
+
 #include <math.h>
+
+/* Random numbers: stream of the first inlet, beyond any particle's id, which are those of the particles. */
+static const uint64_t INFLOW_STREAM = (uint64_t)1 << 63;
 
 static bool in_region(const Sea *sea, const float p[3]) {
     for (int k = 0; sea->has_region && k < 3; k++)
         if (!(p[k] >= sea->region_min[k] && p[k] <= sea->region_max[k]))
             return false;
     return true;
+}
+
+/* Chance that in this step the water at height y of a layer goes, or comes where there is room. The level of
+ * a wave over h of water travels at 3 sqrt(g h) - 2 sqrt(g depth) into water at rest `depth` deep. When each
+ * height of the layer is levelled at that speed over its width, as much passes in all as if the wave went on:
+ * what is quicker sends back a wave upside down, what is slower the wave itself. */
+static double levelling_share(const SkiffSim *sim, float y, float share_of_speed, float layer) {
+    const double gravity = -(double)sim->params.gravity[1], floor = (double)sim->tank.min[1];
+    const double depth = sim->sea.level - sim->origin[1] - floor, height = fmax((double)y - floor, 0.0);
+    const double speed = fmax(3.0 * sqrt(gravity * height) - 2.0 * sqrt(gravity * depth), 0.0);
+    return 1.0 - exp(-(double)share_of_speed * speed / (double)layer * (double)sim->params.time_step);
+}
+
+/* Has its turn come? `share_of_speed` 0: always. */
+static bool has_turn(const SkiffSim *sim, uint64_t stream, float y, float share_of_speed, float layer) {
+    return share_of_speed == 0.0f ||
+           random_share(stream, sim->step) < levelling_share(sim, y, share_of_speed, layer);
 }
 
 /* ---- Inlets ---- */
@@ -165,6 +187,9 @@ static void try_inlet(const SkiffSim *sim, uint32_t index, float flow[4]) {
     uint32_t begin, end;
     double weight_sum = 0.0, sum[3] = {0};
     flow[3] = 0.0f;
+    if (!has_turn(sim, INFLOW_STREAM + index, p[1], sim->params.inflow_speed,
+                  sim->params.inflow_layer * sim->params.particle_radius))
+        return;
     for (int k = 0; k < 3; k++)
         c[k] = (int32_t)floorf((p[k] - grid->origin[k]) * grid->inv_size);
     for (int run = 0; run < 9; run++) {
@@ -225,6 +250,9 @@ static bool let_out(SkiffSim *sim, Err *err) {
         /* above the surface near the edge; and what has got through or over the walls */
         const float depth = !in_region(sea, p) ? INFINITY : -distance[i];
         if (!(depth < (p[1] > level ? layer : -sim->params.particle_radius)))
+            continue;
+        if (depth >= -sim->params.particle_radius &&
+            !has_turn(sim, particles->id[i], p[1], sim->params.outflow_speed, layer))
             continue;
         if (!ghosts_reserve(&sim->ghosts, 1, sim->time, err))
             return false;

@@ -30,6 +30,10 @@
 
 /* Diagonals below this belong to particles without a neighbour to push. */
 static const float MIN_DIAGONAL = 1e-6f;
+/* Water thinner than this, of rest, starts a solve without pressure. Two drops that barely touch have a tiny
+ * diagonal: the first step would cut the pressures of both by a huge amount, of which each one's residual
+ * knows only its own, and they went apart at thousands of m/s by the rest. */
+static const float THIN = 0.5f;
 /* The divergence solve leaves out particles with fewer neighbours: spray has no divergence to speak of. */
 enum { MIN_NEIGHBOURS = 20 };
 /* The two-sided residual goes this far below the one-sided tolerance, so that the usual error, measured at
@@ -392,7 +396,7 @@ static void start_slice(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kin
     const uint16_t *neighbours = problem->rows->neighbours + first;
     const uint8_t *held = problem->held != NULL ? problem->held + first : NONE_HELD;
     const float *carried = dfsph->carried != NULL ? dfsph->carried + first : NO_PRESSURE;
-    const float *lower = lower_of(dfsph, first);
+    const float *density = problem->rows->pairs.density + first, *lower = lower_of(dfsph, first);
     float *p = pressure + first, *inv_diagonal = dfsph->inv_diagonal + first;
     Float4 *operand = dfsph->operand + first;
     EACH_LANE {
@@ -400,7 +404,8 @@ static void start_slice(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kin
         const bool takes_part =
             (diagonal > MIN_DIAGONAL) & (neighbours[l] >= least_neighbours) & (held[l] == 0);
         inv_diagonal[l] = takes_part ? 1.0f / diagonal : 0.0f;
-        const float start = takes_part & (p[l] > lower[l]) ? warm * p[l] : 0.0f;
+        const bool starts = takes_part & (density[l] >= THIN) & (p[l] > lower[l]);
+        const float start = starts ? warm * p[l] : 0.0f;
         p[l] = held[l] != 0 ? p[l] : start;
     }
     EACH_LANE operand[l][3] = p[l] + carried[l];

@@ -49,8 +49,9 @@ bool splat_span(const SplatDisc *disc, int width, int y, int *first, int *end) {
 }
 
 /* Whole groups of pixels, so that the compiler has vectors without remainders; what lies beyond the disc
- * stays. */
-static void draw_depth(const SplatDisc *disc, float dy, int first, int end, float *restrict depth) {
+ * stays. Inlined, so that the form without owners has no trace of them. */
+static inline void draw_disc(const SplatDisc *disc, float dy, int first, int end, float *restrict depth,
+                             uint32_t *restrict owner, uint32_t number) {
     float inv = 1.0f / disc->size, rest = 1.0f - dy * dy, left = ((float)first + 0.5f - disc->x) * inv;
     for (int x = first; x < end; x += SPLAT_LANES, left += (float)SPLAT_LANES * inv)
 #pragma omp simd
@@ -58,20 +59,8 @@ static void draw_depth(const SplatDisc *disc, float dy, int first, int end, floa
             float u = left + (float)k * inv, h = rest - u * u;
             float z = disc->depth - disc->radius * sqrtf(h > 0.0f ? h : 0.0f), old = depth[x + k];
             z = h > 0.0f ? z : old;
-            depth[x + k] = z < old ? z : old;
-        }
-}
-
-static void draw_disc(const SplatDisc *disc, float dy, int first, int end, float *restrict depth,
-                      uint32_t *restrict owner, uint32_t number) {
-    float inv = 1.0f / disc->size, rest = 1.0f - dy * dy, left = ((float)first + 0.5f - disc->x) * inv;
-    for (int x = first; x < end; x += SPLAT_LANES, left += (float)SPLAT_LANES * inv)
-#pragma omp simd
-        for (int k = 0; k < SPLAT_LANES; k++) {
-            float u = left + (float)k * inv, h = rest - u * u;
-            float z = disc->depth - disc->radius * sqrtf(h > 0.0f ? h : 0.0f), old = depth[x + k];
-            z = h > 0.0f ? z : old;
-            owner[x + k] = z < old ? number : owner[x + k];
+            if (owner)
+                owner[x + k] = z < old ? number : owner[x + k];
             depth[x + k] = z < old ? z : old;
         }
 }
@@ -92,7 +81,7 @@ void splat_rows(const Splat *splat, int width, int from, int to, float *depth, u
             if (owner)
                 draw_disc(disc, dy, first, end, row, owner + (size_t)(y - from) * stride, i);
             else
-                draw_depth(disc, dy, first, end, row);
+                draw_disc(disc, dy, first, end, row, NULL, i);
         }
     }
 }

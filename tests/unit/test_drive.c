@@ -13,6 +13,8 @@
 
 #include <cmocka.h>
 
+#include "refuse.h"
+
 #define COUNT(table) ((int)(sizeof(table) / sizeof *(table)))
 
 static const double pi = 3.14159265358979323846;
@@ -406,41 +408,32 @@ static void a_towed_body_reads_its_drag(void **state) {
 
 /* ---- Refusals ---- */
 
-static void refuse(const Scene *scene, const char *expected) {
-    Err err = {0};
-    SkiffSim *sim = skiff_create(&scene->def, &err);
-    if (sim != NULL)
-        fail_msg("not refused: %s", expected);
-    assert_int_equal(err.code, ERR_INPUT);
-    if (strcmp(err.message, expected) != 0)
-        fail_msg("expected: %s\nfound:    %s", expected, err.message);
-}
-
 static void bad_drives_are_refused(void **state) {
     (void)state;
     Scene scene;
     scene_make(&scene);
     memset(scene.drive.axis, 0, sizeof scene.drive.axis);
-    refuse(&scene, "RigidBodies[0].drive.axis: has no direction");
+    refuse_saying(&scene.def, "RigidBodies[0].drive.axis: has no direction");
     scene.drive.axis[1] = -3.0f;
-    refuse(&scene,
-           "RigidBodies[0].drive.axis: points down at the start; it must be within 84 degrees of level");
+    refuse_saying(
+        &scene.def,
+        "RigidBodies[0].drive.axis: points down at the start; it must be within 84 degrees of level");
     scene_make(&scene);
     scene.body.free_axes = 0;
-    refuse(&scene, "RigidBodies[0].drive: has no effect, since the body has no free axis");
+    refuse_saying(&scene.def, "RigidBodies[0].drive: has no effect, since the body has no free axis");
     scene_make(&scene);
     scene.drive.thrust = -1.0f;
     scene.drive.wind[2] = NAN;
-    refuse(&scene, "RigidBodies[0].drive.thrust: -1 is out of range, allowed is 0 to 1e+09 N\n"
-                   "RigidBodies[0].drive.wind: nan is out of range, allowed is -1000 to 1000 m/s");
+    refuse_saying(&scene.def, "RigidBodies[0].drive.thrust: -1 is out of range, allowed is 0 to 1e+09 N\n"
+                              "RigidBodies[0].drive.wind: nan is out of range, allowed is -1000 to 1000 m/s");
     scene_make(&scene);
     scene.drive.thrust_at = SKIFF_THRUST_AT_PROPELLER;
     scene.drive.steering = SKIFF_STEERING_RUDDER;
-    refuse(&scene, "RigidBodies[0].drive.propeller: is inside the body, where no water comes\n"
-                   "RigidBodies[0].drive.rudder: is inside the body, where no water comes");
+    refuse_saying(&scene.def, "RigidBodies[0].drive.propeller: is inside the body, where no water comes\n"
+                              "RigidBodies[0].drive.rudder: is inside the body, where no water comes");
     scene_make(&scene);
     scene.drive.steering = 2;
-    refuse(&scene, "RigidBodies[0].drive.steering: 2 is out of range, allowed is 0 to 1");
+    refuse_saying(&scene.def, "RigidBodies[0].drive.steering: 2 is out of range, allowed is 0 to 1");
 }
 
 static void bad_controls_are_refused(void **state) {

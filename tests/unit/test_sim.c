@@ -11,6 +11,8 @@
 
 #include <cmocka.h>
 
+#include "refuse.h"
+
 /* A 0.6 m tank with a few hundred particles. */
 typedef struct Scene {
     SkiffDef def;
@@ -47,16 +49,6 @@ static void scene_make(Scene *scene) {
     scene->def.probes = &scene->probe;
 }
 
-static void refuse(const Scene *scene, const char *expected) {
-    Err err = {0};
-    SkiffSim *sim = skiff_create(&scene->def, &err);
-    if (sim != NULL)
-        fail_msg("not refused: %s", expected);
-    assert_int_equal(err.code, ERR_INPUT);
-    if (strstr(err.message, expected) == NULL)
-        fail_msg("expected: %s\nfound:    %s", expected, err.message);
-}
-
 static SkiffSim *accept(const Scene *scene) {
     Err err = {0};
     SkiffSim *sim = skiff_create(&scene->def, &err);
@@ -71,48 +63,49 @@ static void test_refusals(void **state) {
     scene_make(&scene);
     scene.def.params.particle_radius = -1.0f;
     scene.def.params.viscosity = NAN;
-    refuse(&scene, "Configuration.particleRadius: -1 is out of range, allowed is 0.0001 to 10 m\n"
-                   "Configuration.viscosity: nan is out of range, allowed is 0 to 1");
+    refuse(&scene.def, "Configuration.particleRadius: -1 is out of range, allowed is 0.0001 to 10 m\n"
+                       "Configuration.viscosity: nan is out of range, allowed is 0 to 1");
     scene_make(&scene);
     scene.block.end[0] = -2.0f;
-    refuse(&scene, "FluidBlocks[0]: end[0] = -2 m must be above start[0] = -0.275 m");
+    refuse(&scene.def, "FluidBlocks[0]: end[0] = -2 m must be above start[0] = -0.275 m");
     scene_make(&scene);
     scene.block.end[2] = NAN;
-    refuse(&scene, "FluidBlocks[0]: start, end, velocity and time must be finite");
+    refuse(&scene.def, "FluidBlocks[0]: start, end, velocity and time must be finite");
     scene_make(&scene);
     scene.block.end[1] = 0.825f;
     scene.block.end[0] = 0.375f;
-    refuse(&scene, "352 of its 2288 particles are outside the tank, the first at (0.3, 0.05, -0.25) m");
+    refuse(&scene.def, "352 of its 2288 particles are outside the tank, the first at (0.3, 0.05, -0.25) m");
     scene_make(&scene);
     scene.block.end[1] = 1e7f;
-    refuse(&scene, "particles need about");
+    refuse(&scene.def, "particles need about");
     scene_make(&scene);
     scene.def.body_count = 2;
-    refuse(&scene, "RigidBodies[1]: overlaps RigidBodies[0] by at least 0.05 m (allowed: less than 0.025 m)");
+    refuse(&scene.def,
+           "RigidBodies[1]: overlaps RigidBodies[0] by at least 0.05 m (allowed: less than 0.025 m)");
     scene_make(&scene);
     scene.def.body_count = 1;
     scene.bodies[0].geometry.translation[0] = 0.3f;
-    refuse(&scene, "RigidBodies[0]: reaches 0.1 m through the tank's wall (allowed: 0.025 m)");
+    refuse(&scene.def, "RigidBodies[0]: reaches 0.1 m through the tank's wall (allowed: 0.025 m)");
     scene_make(&scene);
     scene.def.body_count = 2;
     scene.bodies[1].name = "first";
-    refuse(&scene, "RigidBodies[1].name: 'first' is also the name of RigidBodies[0]");
+    refuse(&scene.def, "RigidBodies[1].name: 'first' is also the name of RigidBodies[0]");
     scene_make(&scene);
     scene.def.tank.wet_height = -1.0f;
-    refuse(&scene, "Tank.wetHeight: -1 m is below the tank's floor at 0 m");
+    refuse(&scene.def, "Tank.wetHeight: -1 m is below the tank's floor at 0 m");
     scene_make(&scene);
     scene.def.tank.geometry.size[1] = 0.0f;
-    refuse(&scene, "Tank.box[1]: 0 m, must be above 0");
+    refuse(&scene.def, "Tank.box[1]: 0 m, must be above 0");
     scene_make(&scene);
     scene.def.probe_count = 1;
     scene.probe.name = "p";
     scene.probe.kind = SKIFF_PROBE_FORCE;
     scene.probe.object = "raft";
-    refuse(&scene, "Probes[0].object: no body is named 'raft'");
+    refuse(&scene.def, "Probes[0].object: no body is named 'raft'");
     scene.probe.kind = SKIFF_PROBE_PRESSURE;
     scene.probe.object = NULL;
     scene.probe.point[1] = 0.3f;
-    refuse(&scene, "Probes[0].point: no wall or body within 0.1 m of (0, 0.3, 0)");
+    refuse(&scene.def, "Probes[0].point: no wall or body within 0.1 m of (0, 0.3, 0)");
 }
 
 static void test_blow_up(void **state) {
@@ -437,14 +430,46 @@ static void test_pressure(void **state) {
     skiff_destroy(sim);
 }
 
+/* Two drops that barely touch and still have the pressure of the water they came from, over water whose slow
+ * modes make the solver's steps long, within a tolerance that hides so few from it: nothing throws them. */
+static void test_drops_touching(void **state) {
+    (void)state;
+    Scene scene;
+    scene_make(&scene);
+    scene.def.params.max_density_error = 2.0f;
+    scene.def.params.min_iterations = 8;
+    SkiffSim *sim = accept(&scene);
+    const uint64_t first_drop = sim->particles.next_id;
+    const float apart = 3.913f * sim->params.particle_radius, speed = 1.0f;
+    Err err = {0};
+    for (int trial = 0; trial < 160; trial++) {
+        assert_true(sim_reserve(sim, sim->particles.count + 2, &err));
+        for (uint32_t i = 0; i < sim->particles.count; i++)
+            sim->particles.velocity[i][1] = -speed;
+        for (int side = 0; side < 2; side++) {
+            const float p[3] = {-0.2f + (float)side * apart, 0.55f, -0.2f + 0.0025f * (float)trial};
+            const uint32_t drop = particles_append(&sim->particles, p, (const float[3]){0}, sim->time);
+            sim->particles.pressure[drop] = 1e-4f;
+        }
+        for (int step = 0; step < 2; step++) {
+            assert_true(skiff_step(sim, &err));
+            assert_true(sim->stats.max_speed < 1.5 * (double)speed);
+        }
+        for (uint32_t i = sim->particles.count; i-- > 0;)
+            if (sim->particles.id[i] >= first_drop)
+                particles_remove(&sim->particles, &i, 1, sim->pressure.data);
+    }
+    skiff_destroy(sim);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_refusals),      cmocka_unit_test(test_blow_up),
-        cmocka_unit_test(test_escape),        cmocka_unit_test(test_emit),
-        cmocka_unit_test(test_flat_wall),     cmocka_unit_test(test_states),
-        cmocka_unit_test(test_carving),       cmocka_unit_test(test_remove_box),
-        cmocka_unit_test(test_wall_friction), cmocka_unit_test(test_drops_apart),
-        cmocka_unit_test(test_pressure),
+        cmocka_unit_test(test_refusals),       cmocka_unit_test(test_blow_up),
+        cmocka_unit_test(test_escape),         cmocka_unit_test(test_emit),
+        cmocka_unit_test(test_flat_wall),      cmocka_unit_test(test_states),
+        cmocka_unit_test(test_carving),        cmocka_unit_test(test_remove_box),
+        cmocka_unit_test(test_wall_friction),  cmocka_unit_test(test_drops_apart),
+        cmocka_unit_test(test_drops_touching), cmocka_unit_test(test_pressure),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

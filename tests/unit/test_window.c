@@ -8,6 +8,8 @@
 
 #include <cmocka.h>
 
+#include "refuse.h"
+
 typedef struct Scene {
     SkiffDef def;
     SkiffBodyDef body;
@@ -206,14 +208,95 @@ static void test_body_outruns_the_window(void **state) {
     skiff_destroy(sim);
 }
 
-static void refuse(const Scene *scene, const char *expected) {
+/* ---- Absorption at the speed of waves ---- */
+
+/* How many of `count` heights have their turn in a step, when still water is `depth` deep: mean and variance.
+ */
+static void expect_turns(const SkiffSim *sim, const float *height, int count, float speed, double sums[2]) {
+    const double layer = 8.0 * (double)sim->params.particle_radius, dt = sim->params.time_step;
+    const double depth = sim->sea.level - sim->origin[1];
+    sums[0] = sums[1] = 0.0;
+    for (int k = 0; k < count; k++) {
+        const double wave = 3.0 * sqrt(9.81 * (double)height[k]) - 2.0 * sqrt(9.81 * depth);
+        const double share = 1.0 - exp(-(double)speed * fmax(wave, 0.0) / layer * dt);
+        sums[0] += share;
+        sums[1] += share * (1.0 - share);
+    }
+}
+
+static SkiffSim *basin_make(Scene *scene, float speed) {
+    scene_make(scene);
+    scene->def.sea.path_count = 0;
+    scene->def.params.outflow_distance = scene->def.params.inflow_layer = 8.0f;
+    scene->def.params.outflow_speed = scene->def.params.inflow_speed = speed;
+    SkiffSim *sim = accept(scene);
+    step(sim);
+    return sim;
+}
+
+/* The sea has sunk by a fifth of a metre. Returns how many of the layer stand above it, and their heights. */
+static int sink(SkiffSim *sim, float *height, int capacity) {
     Err err = {0};
-    SkiffSim *sim = skiff_create(&scene->def, &err);
-    if (sim != NULL)
-        fail_msg("not refused: %s", expected);
-    assert_int_equal(err.code, ERR_INPUT);
-    if (strstr(err.message, expected) == NULL)
-        fail_msg("expected: %s\nfound:    %s", expected, err.message);
+    sim->sea.level -= 0.2;
+    int above = 0;
+    for (uint32_t i = 0; i < sim->particles.count; i++) {
+        const float *p = sim->particles.position[i];
+        const bool goes = p[1] > (float)sim->sea.level && hypotf(p[0], p[2]) > 0.8f - 0.32f;
+        if (goes && above < capacity)
+            height[above++] = p[1];
+    }
+    sim->stats.particles_out[SKIFF_OUT_OUTFLOW] = 0;
+    assert_true(absorb_waves(sim, &err));
+    return above;
+}
+
+/* The upper fifth of a metre has gone: there is room for it. Returns how many came, and their heights. */
+static int refill(SkiffSim *sim, float *height, int capacity) {
+    Err err = {0};
+    for (uint32_t i = sim->particles.count; i-- > 0;)
+        if (sim->particles.position[i][1] > 0.3f)
+            particles_remove(&sim->particles, &i, 1, sim->pressure.data);
+    sim->sea.absorbs = false;
+    step(sim); /* sorts them */
+    sim->sea.absorbs = true;
+    const uint32_t before = sim->particles.count;
+    assert_true(absorb_waves(sim, &err));
+    const int came = (int)sim->stats.particles_in[SKIFF_IN_INFLOW];
+    for (int k = 0; k < came && k < capacity; k++)
+        height[k] = sim->particles.position[before + (uint32_t)k][1];
+    return came;
+}
+
+static void test_levelling(void **state) {
+    (void)state;
+    enum { CAPACITY = 4000 };
+    static float height[CAPACITY];
+    const float speeds[2] = {0.0f, 8.0f}; /* at once; as eight waves */
+    double sums[2];
+    for (int k = 0; k < 2; k++) {
+        Scene scene;
+        SkiffSim *sim = basin_make(&scene, speeds[k]);
+        const int above = sink(sim, height, CAPACITY);
+        const double gone = sim->stats.particles_out[SKIFF_OUT_OUTFLOW];
+        assert_in_range(above, 300, CAPACITY - 1);
+        expect_turns(sim, height, above, speeds[1], sums);
+        assert_true(sums[0] < 0.6 * above);
+        assert_float_equal(gone, k == 0 ? above : sums[0], k == 0 ? 0.0 : 4.0 * sqrt(sums[1]));
+        skiff_destroy(sim);
+    }
+    for (int k = 0; k < 2; k++) {
+        Scene scene;
+        SkiffSim *sim = basin_make(&scene, speeds[k]);
+        const int came = refill(sim, height, CAPACITY);
+        if (k == 0) {
+            assert_in_range(came, 300, CAPACITY - 1);
+            expect_turns(sim, height, came, speeds[1], sums);
+            assert_true(sums[0] < 0.6 * came);
+        } else {
+            assert_float_equal(came, sums[0], 4.0 * sqrt(sums[1]));
+        }
+        skiff_destroy(sim);
+    }
 }
 
 static void test_refusals(void **state) {
@@ -221,21 +304,21 @@ static void test_refusals(void **state) {
     Scene scene;
     scene_make(&scene);
     scene.def.params.volume_factor = 0.9f;
-    refuse(&scene, "Configuration.volumeFactor: 0.9, but filling with water at rest needs 0.8");
+    refuse(&scene.def, "Configuration.volumeFactor: 0.9, but filling with water at rest needs 0.8");
     scene_make(&scene);
     scene.def.tank.geometry.radius = 0.3f;
-    refuse(&scene, "Sea: a window must be at least");
+    refuse(&scene.def, "Sea: a window must be at least");
     scene_make(&scene);
     scene.def.sea.level = 1.5f;
-    refuse(&scene, "Sea.level: 1.5 m, must lie between the tank's floor");
+    refuse(&scene.def, "Sea.level: 1.5 m, must lie between the tank's floor");
     scene_make(&scene);
     follow_body(&scene);
     scene.def.sea.follow = "raft";
-    refuse(&scene, "Sea.follow: there is no body 'raft'");
+    refuse(&scene.def, "Sea.follow: there is no body 'raft'");
     scene_make(&scene);
     follow_body(&scene);
     scene.body.geometry.translation[0] = 2.0f;
-    refuse(&scene, "Sea.follow: body 'box' starts outside the window");
+    refuse(&scene.def, "Sea.follow: body 'box' starts outside the window");
 }
 
 int main(void) {
@@ -243,7 +326,7 @@ int main(void) {
         cmocka_unit_test(test_still_water),     cmocka_unit_test(test_every_shape),
         cmocka_unit_test(test_particles_stay),  cmocka_unit_test(test_path_into_an_obstacle),
         cmocka_unit_test(test_path_that_jumps), cmocka_unit_test(test_body_outruns_the_window),
-        cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_levelling),       cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
