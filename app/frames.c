@@ -118,10 +118,9 @@ static void copy_particles(Frame *frame, const SkiffParticles *particles, float 
     memcpy(frame->id, particles->id, count * sizeof *frame->id);
     memcpy(frame->birth, particles->birth, count * sizeof *frame->birth);
     for (size_t i = 0; i < count; i++) {
-        /* Before the first step neither is known: water at rest, not yet pressed. */
+        /* Before the first step it is not known: water at rest. */
         frame->density[i] = particles->density ? particles->density[i] : 1;
-        frame->pressure[i] = particles->pressure ? particles->pressure[i] : 0;
-        frame->gone[i] = 0;
+        frame->pressure[i] = frame->gone[i] = 0;
         for (int k = 0; k < 3; k++)
             frame->position[i][k] = particles->position[i][k] - particles->velocity[i][k] * back;
         frame->position[i][3] = 0;
@@ -168,6 +167,10 @@ bool frame_capture(Frame *frame, const SkiffSim *sim, const FrameBody *before, d
     for (int i = 0; before && share < 1 && i < frame->body_count; i++)
         between(&before[i], share, &frame->bodies[i]);
     return true;
+}
+
+bool frame_capture_pressure(Frame *frame, const SkiffSim *sim, Err *err) {
+    return skiff_pressure(sim, frame->pressure, err);
 }
 
 /* ---- Files ---- */

@@ -32,7 +32,7 @@ typedef struct Frame {
     float (*position)[4]; /* m, local; [3] is 0 */
     float (*velocity)[4]; /* m/s; [3] is 0 */
     float *density;       /* rho / rho0; 0 past live */
-    float *pressure;      /* Pa; 0 past live */
+    float *pressure;      /* Pa; 0 past live, and where nobody asked for it */
     uint64_t *id;
     double *birth; /* s */
     float *gone;   /* s since removal; 0 before live */
@@ -56,6 +56,9 @@ void frame_poses(const SkiffSim *sim, FrameBody *bodies);
  * at `before_time`; NULL: those of the end) and now. ERR_INPUT when memory is exhausted. */
 bool frame_capture(Frame *frame, const SkiffSim *sim, const FrameBody *before, double before_time,
                    double time, Err *err);
+
+/* Adds the pressures, which take a search for neighbours, to a frame just captured. */
+bool frame_capture_pressure(Frame *frame, const SkiffSim *sim, Err *err);
 
 /* Horizontal signed distances to the window's edge (m, negative inside) at count points of the plane y = 0,
  * local. False where there is no window. */

@@ -54,6 +54,10 @@ static float field_of(RenderField field, const Frame *frame, uint32_t i) {
     return 0;
 }
 
+bool shade_needs_pressure(const SceneRender *render) {
+    return render->look == LOOK_PARTICLES && render->field == RENDER_PRESSURE;
+}
+
 void shade_field(RenderField field, const Frame *frame, float *values) {
     for (uint32_t i = 0; i < frame->count; i++)
         values[i] = field_of(field, frame, i);

@@ -12,6 +12,9 @@ void shade_fade(const SceneRender *render, const Frame *frame, double start, flo
 /* frame->count values in the unit of the legend. */
 void shade_field(RenderField field, const Frame *frame, float *values);
 
+/* Does shade_field of what is drawn read the pressures? */
+bool shade_needs_pressure(const SceneRender *render);
+
 typedef struct ShadeLegend {
     float min, max; /* min < max */
     const char *title, *unit;

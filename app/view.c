@@ -636,19 +636,20 @@ static bool save(View *view, int number, Err *err) {
 /* Draws and saves all that is due by now. */
 static bool catch_up(View *view, const SkiffSim *sim, const FrameBody *before, const ViewControls *controls,
                      Err *err) {
-    double now = skiff_time(sim) + frame_time_tolerance;
     for (;;) {
         double draw_time = time_of(view, &view->draw), save_time = time_of(view, &view->save);
         double time = fmin(draw_time, save_time);
-        if (!(time <= now))
+        if (!(time <= skiff_time(sim) + frame_time_tolerance))
             return true;
-        if (!frame_capture(&view->frame, sim, before, view->before_time, time, err))
+        bool saves = save_time <= time + frame_time_tolerance;
+        bool needs_pressure = saves || shade_needs_pressure(&view->options.render);
+        if (!frame_capture(&view->frame, sim, before, view->before_time, time, err) ||
+            (needs_pressure && !frame_capture_pressure(&view->frame, sim, err)))
             return false;
         view->frame.controls = controls->driven;
         view->step_ms = controls->step_ms;
-        if (save_time <= time + frame_time_tolerance && !save(view, view->save.next++, err))
-            return false;
-        if (draw_time <= time + frame_time_tolerance && !draw(view, &view->frame, view->draw.next++, err))
+        if ((saves && !save(view, view->save.next++, err)) ||
+            (draw_time <= time + frame_time_tolerance && !draw(view, &view->frame, view->draw.next++, err)))
             return false;
     }
 }

@@ -132,23 +132,27 @@ static void hold_block(const uint8_t *held, const PairData *pairs, const Acceler
     }
 }
 
-/* The operand of D^T becomes p. */
+/* The operand of D^T becomes p, and what the divergence solve has found beside it. */
 static void set_operand(Dfsph *dfsph, const DfsphProblem *problem, const float *p) {
     const uint32_t blocks = particles_blocks(problem->particles);
+    const float *carried = dfsph->carried;
     EACH_BLOCK {
         for (uint32_t i = block * BLOCK; i < (block + 1) * BLOCK; i++)
-            dfsph->operand[i][3] = p[i];
+            dfsph->operand[i][3] = carried != NULL ? p[i] + carried[i] : p[i];
     }
 }
 
-/* result = base + scale D^T p for the fluid, response = D^T p for the bodies; p is the operand's. base NULL:
- * 0. */
+/* result = base + push + scale D^T p for the fluid, response = D^T p for the bodies; p is the operand's. base
+ * NULL: 0, and no push. */
 static void apply_transpose(Dfsph *dfsph, const DfsphProblem *problem, const Float4 *base, float scale,
                             Float4 *result) {
     const uint32_t blocks = particles_blocks(problem->particles);
     const PairData *pairs = dfsph->pairs;
-    const AccelerateJob job = {
-        .operand = (const Float4 *)dfsph->operand, .base = base, .scale = scale, .result = result};
+    const AccelerateJob job = {.operand = (const Float4 *)dfsph->operand,
+                               .base = base,
+                               .push = {dfsph->push[0], dfsph->push[1], dfsph->push[2]},
+                               .scale = scale,
+                               .result = result};
     EACH_BLOCK {
         if (base == NULL && dfsph->still[block])
             continue;
@@ -194,7 +198,7 @@ static void divergence_block(const Dfsph *dfsph, const DfsphProblem *problem, co
         subtract_bodies(problem->boundary, velocities, result, block);
 }
 
-/* result = velocity - D^T p / dt, p the operand's; the bodies' share stays in `response`. */
+/* result = velocity + push - D^T p / dt, p the operand's; the bodies' share stays in `response`. */
 static void apply_pressure(Dfsph *dfsph, const DfsphProblem *problem, Float4 *result) {
     apply_transpose(dfsph, problem, (const Float4 *)problem->particles->velocity,
                     -1.0f / problem->params->time_step, result);
@@ -310,19 +314,30 @@ static const float YIELD_TIME = 0.1f;
 /* What a density solve corrects: a share gamma of the density error, and the error that this step's motion
  * will add because D v is only the tangent. That is taken to be what the last step's motion added. Without it
  * a fast flow carries an error of 1 / gamma times a step's. */
-static float density_source(const SkiffParams *params, float density, float prediction, const float *v) {
+typedef struct DensitySource {
+    float softening;      /* gamma */
+    float feedforward;    /* share of last step's that is expected again */
+    float least_speed_sq; /* m^2/s^2: who moves less than a hundredth of the spacing a step has no curved
+                           * part to foresee, only noise to repeat */
+} DensitySource;
+
+static DensitySource density_source(const SkiffParams *params) {
+    const float least = 0.02f * params->particle_radius / params->time_step;
+    return (DensitySource){.softening = params->softening,
+                           .feedforward =
+                               params->pressure_solver != SKIFF_SOLVER_JACOBI ? params->feedforward : 0.0f,
+                           .least_speed_sq = least * least};
+}
+
+static inline float density_source_at(const DensitySource *source, float density, float prediction,
+                                      float speed_sq) {
     static const float LARGEST = 0.005f,
                        DENSE = 0.99f; /* near the surface neighbours come and go: nothing to learn there */
-    float expected = 0.0f;
-    /* who moves less than a hundredth of the spacing a step has no curved part to foresee, only noise to
-     * repeat */
-    const float least = 0.02f * params->particle_radius / params->time_step;
-    const bool moves = v[0] * v[0] + v[1] * v[1] + v[2] * v[2] > least * least;
-    if (moves && prediction > 0.0f && density > DENSE && params->pressure_solver != SKIFF_SOLVER_JACOBI)
-        expected = params->feedforward * (density - prediction);
+    const bool foresees = (speed_sq > source->least_speed_sq) & (prediction > 0.0f) & (density > DENSE);
+    float expected = foresees ? source->feedforward * (density - prediction) : 0.0f;
     expected = expected > LARGEST ? LARGEST : expected < -LARGEST ? -LARGEST : expected;
     const float patience = prediction < 0.0f ? 1.0f + prediction : 1.0f;
-    return patience * params->softening * (density - 1.0f) + expected;
+    return patience * source->softening * (density - 1.0f) + expected;
 }
 
 /* Density that the velocities found lead to: rho + dt D v, from the residual that is left. Drops that fly
@@ -345,14 +360,23 @@ static void predict_density(const Dfsph *dfsph, const DfsphProblem *problem) {
     }
 }
 
-/* What stands beside dt D v. Divergence and flow: where there is room to the rest density, approaching is no
- * fault: thin water falls together freely. */
-static float source_of(const DfsphProblem *problem, SolveKind kind, uint32_t i) {
-    const float density = problem->rows->pairs.density[i];
-    if (kind == SOLVE_DENSITY || kind == SOLVE_SHIFT)
-        return density_source(problem->params, density, problem->particles->prediction[i],
-                              problem->particles->velocity[i]);
-    return density < 1.0f ? density - 1.0f : 0.0f;
+/* What stands beside dt D v, of a slice. Divergence and flow: where there is room to the rest density,
+ * approaching is no fault: thin water falls together freely. */
+static void source_slice(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind,
+                         const DensitySource *terms, uint32_t first) {
+    float *source = dfsph->source + first;
+    const float *density = problem->rows->pairs.density + first;
+    if (kind == SOLVE_DIVERGENCE || kind == SOLVE_FLOW) {
+        EACH_LANE source[l] = density[l] < 1.0f ? density[l] - 1.0f : 0.0f;
+        return;
+    }
+    const float *prediction = problem->particles->prediction + first;
+    const Float4 *velocity = (const Float4 *)problem->particles->velocity + first;
+    EACH_LANE {
+        const float *v = velocity[l];
+        source[l] =
+            density_source_at(terms, density[l], prediction[l], v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    }
 }
 
 /* Share of the last solution to start from. */
@@ -360,56 +384,79 @@ static float warm_start(const SkiffParams *params, SolveKind kind) {
     return kind == SOLVE_DIVERGENCE ? params->warm_start_divergence : params->warm_start;
 }
 
-/* Inverse diagonal, 0 where a particle takes no part; source; bounds; pressure scaled to the warm start, also
- * as the operand. */
+/* Inverse diagonal, 0 where a particle takes no part; pressure scaled to the warm start, also as the operand;
+ * of a slice. */
+static void start_slice(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, float *pressure,
+                        uint32_t first) {
+    static const float NO_PRESSURE[SLICE];
+    static const uint8_t NONE_HELD[SLICE];
+    const float warm = warm_start(problem->params, kind);
+    const int least_neighbours = kind == SOLVE_DIVERGENCE ? MIN_NEIGHBOURS : 0;
+    const Float4 *gradient_sum = dfsph->pairs->gradient_sum + first;
+    const uint16_t *neighbours = problem->rows->neighbours + first;
+    const uint8_t *held = problem->held != NULL ? problem->held + first : NONE_HELD;
+    const float *carried = dfsph->carried != NULL ? dfsph->carried + first : NO_PRESSURE;
+    const float *density = problem->rows->pairs.density + first, *lower = lower_of(dfsph, first);
+    float *p = pressure + first, *inv_diagonal = dfsph->inv_diagonal + first;
+    Float4 *operand = dfsph->operand + first;
+    EACH_LANE {
+        const float diagonal = gradient_sum[l][3];
+        const bool takes_part =
+            (diagonal > MIN_DIAGONAL) & (neighbours[l] >= least_neighbours) & (held[l] == 0);
+        inv_diagonal[l] = takes_part ? 1.0f / diagonal : 0.0f;
+        const bool starts = takes_part & (density[l] >= THIN) & (p[l] > lower[l]);
+        const float start = starts ? warm * p[l] : 0.0f;
+        p[l] = held[l] != 0 ? p[l] : start;
+    }
+    EACH_LANE operand[l][3] = p[l] + carried[l];
+}
+
+/* Water under pressure may be pulled, too. */
+static void lower_block(Dfsph *dfsph, const float *pressure, uint32_t block) {
+    for (uint32_t i = block * BLOCK; i < (block + 1) * BLOCK; i++)
+        dfsph->lower[i] = pressure[i] > 0.0f ? -FLT_MAX : 0.0f;
+}
+
+static bool all_held(const uint8_t *held, uint32_t block) {
+    for (uint32_t i = block * BLOCK; held != NULL && i < (block + 1) * BLOCK; i++)
+        if (!held[i])
+            return false;
+    return held != NULL;
+}
+
+/* What a solve begins with. */
 static void prepare(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, float *p) {
     const uint32_t blocks = particles_blocks(problem->particles);
-    const uint32_t count = problem->particles->count;
-    const float warm = warm_start(problem->params, kind);
-    const Float4 *gradient_sum = dfsph->pairs->gradient_sum;
-    const float *pressure = problem->particles->pressure;
+    const DensitySource terms = density_source(problem->params);
     memset(dfsph->lower, 0, SLICE * sizeof *dfsph->lower);
     EACH_BLOCK {
+        const size_t begin = (size_t)block * BLOCK;
         /* other arrays may have lain here */
-        memset(dfsph->direction + (size_t)block * BLOCK, 0, BLOCK * sizeof(float));
-        memset(dfsph->image + (size_t)block * BLOCK, 0, BLOCK * sizeof(float));
-        memcpy(dfsph->operand + (size_t)block * BLOCK, problem->particles->position + (size_t)block * BLOCK,
-               BLOCK * sizeof(Float4));
-        bool still = problem->held != NULL;
-        for (uint32_t i = block * BLOCK; i < (block + 1) * BLOCK; i++) {
-            const bool few = kind == SOLVE_DIVERGENCE && problem->rows->neighbours[i] < MIN_NEIGHBOURS;
-            const bool held = problem->held != NULL && problem->held[i];
-            still = still && held;
-            const bool takes_part = i < count && gradient_sum[i][3] > MIN_DIAGONAL && !few && !held;
-            const bool is_thin = problem->rows->pairs.density[i] < THIN;
-            const float lower = kind == SOLVE_SHIFT && pressure[i] > 0.0f ? -FLT_MAX : 0.0f;
-            if (kind == SOLVE_SHIFT)
-                dfsph->lower[i] = lower;
-            dfsph->inv_diagonal[i] = takes_part ? 1.0f / gradient_sum[i][3] : 0.0f;
-            if (!held)
-                p[i] = takes_part && !is_thin && p[i] > lower ? warm * p[i] : 0.0f;
-            dfsph->operand[i][3] = p[i];
-            dfsph->source[i] = source_of(problem, kind, i);
+        memset(dfsph->direction + begin, 0, BLOCK * sizeof(float));
+        memset(dfsph->image + begin, 0, BLOCK * sizeof(float));
+        memcpy(dfsph->operand + begin, problem->particles->position + begin, BLOCK * sizeof(Float4));
+        if (dfsph->shifting)
+            lower_block(dfsph, problem->particles->pressure, block);
+        EACH_SLICE {
+            start_slice(dfsph, problem, kind, p, first);
+            source_slice(dfsph, problem, kind, &terms, first);
         }
-        dfsph->still[block] = still;
+        dfsph->still[block] = all_held(problem->held, block);
     }
 }
 
-/* Root mean square of the velocities without this step's gravity, in particle spacings a step. What is held
- * has no gravity to be taken out, and would seem to fall. */
+/* Root mean square of the velocities before this step's gravity, in particle spacings a step, of what is not
+ * held. */
 static double water_motion(const Dfsph *dfsph, const DfsphProblem *problem) {
     const uint32_t blocks = particles_blocks(problem->particles);
     const uint32_t count = problem->particles->count;
     const Float4 *velocity = (const Float4 *)problem->particles->velocity;
-    const float dt = problem->params->time_step, *gravity = problem->params->gravity;
     EACH_BLOCK {
         double sum = 0.0;
         const uint32_t end = (block + 1) * BLOCK < count ? (block + 1) * BLOCK : count;
         for (uint32_t i = block * BLOCK; i < end; i++)
-            for (int k = 0; k < 3 && !(problem->held != NULL && problem->held[i]); k++) {
-                const float v = velocity[i][k] - dt * gravity[k];
-                sum += (double)(v * v);
-            }
+            for (int k = 0; k < 3 && !(problem->held != NULL && problem->held[i]); k++)
+                sum += (double)(velocity[i][k] * velocity[i][k]);
         dfsph->partials[block * DFSPH_SUMS] = sum;
     }
     double total;
@@ -549,9 +596,10 @@ static SolveResult solve_jacobi(Dfsph *dfsph, const DfsphProblem *problem, float
             const uint32_t end = (block + 1) * BLOCK;
             for (uint32_t i = block * BLOCK; i < end; i++) {
                 const float next = p[i] + relaxation * dfsph->residual[i] * dfsph->inv_diagonal[i];
-                p[i] = dfsph->operand[i][3] = next > 0.0f ? next : 0.0f;
+                p[i] = next > 0.0f ? next : 0.0f;
             }
         }
+        set_operand(dfsph, problem, p);
         if ((errors.one_sided <= limits.tolerance && iterations >= limits.min) || iterations >= limits.max)
             return (SolveResult){iterations, errors.one_sided, errors.two_sided};
     }
@@ -598,6 +646,10 @@ SolveResult dfsph_solve(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kin
     dfsph->moving = problem->body_count > 0 && problem->boundary->moving.samples.count != 0;
     dfsph->answering = kind != SOLVE_SHIFT;
     dfsph->shifting = kind == SOLVE_SHIFT;
+    dfsph->carried =
+        kind == SOLVE_DENSITY && !problem->density_alone ? problem->particles->pressure_divergence : NULL;
+    for (int k = 0; k < 3; k++)
+        dfsph->push[k] = first ? problem->params->time_step * problem->params->gravity[k] : 0.0f;
     if (dfsph->moving)
         memset(dfsph->response, 0, (1 + (size_t)problem->body_count) * sizeof *dfsph->response);
     prepare(dfsph, problem, kind, p);
@@ -605,6 +657,8 @@ SolveResult dfsph_solve(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kin
     const SolveResult result = problem->params->pressure_solver == SKIFF_SOLVER_JACOBI
                                    ? solve_jacobi(dfsph, problem, p, limits)
                                    : solve_gcr(dfsph, problem, p, limits);
+    if (kind == SOLVE_DIVERGENCE)
+        return result;
     if (kind == SOLVE_DENSITY || kind == SOLVE_SHIFT)
         predict_density(dfsph, problem);
     set_operand(dfsph, problem, p);

@@ -32,6 +32,8 @@ typedef struct Dfsph {
     double (*impulses)[6]; /* [objects] sums of boundary_impulse */
     float *lower;          /* [particles] least value of the unknown in a shift; one slice of zeros else */
     uint8_t *still;        /* [blocks] 1: all of it is held, and its vectors are zero during a solve */
+    const float *carried;  /* NULL, or [particles] pressure that acts beside the unknown */
+    float push[3];         /* m/s, of gravity: acts beside the pressures */
     bool shifting;
     bool moving;           /* any object has a velocity or may get one */
     bool answering;        /* and bodies answer pressure */
@@ -54,6 +56,7 @@ typedef struct DfsphProblem {
     int body_count;
     Particles *particles;
     const uint8_t *held;      /* NULL, or [particles] 1: keeps velocity and pressure, with a row or without */
+    bool density_alone;       /* no divergence solve comes before the density's */
     bool settling;            /* a fill's: steps that only lead somewhere stop as a flow's do */
     uint32_t evaluated_count; /* particles that are not held: errors are means over these */
     int threads;
@@ -63,7 +66,9 @@ bool dfsph_reserve(Dfsph *dfsph, uint32_t particle_capacity, uint32_t object_cou
 void dfsph_free(Dfsph *dfsph);
 
 /* Solves for the pressure field of `kind` (particles->pressure or pressure_divergence, warm start in, result
- * out) and changes the velocities of fluid and bodies by it. */
+ * out). The divergence solve changes nothing else: the density solve after it gives velocities of fluid and
+ * bodies what both have found, and the fluid its gravity. So does the flow's with its own; a shift changes no
+ * velocity. */
 SolveResult dfsph_solve(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind);
 
 #endif

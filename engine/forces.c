@@ -1,4 +1,4 @@
-/* Everything that is not pressure: gravity, XSPH viscosity among the fluid [Schechter & Bridson 2012], and
+/* What rubs: XSPH viscosity among the fluid [Schechter & Bridson 2012], and
  * friction on walls and bodies, which is XSPH towards their samples: v_i loses the share  friction * sum_b
  * psi_b W_ib  of its velocity relative to the object, and the object gets the momentum. The sum is part of
  * every contact, so friction visits no sample. */
@@ -74,15 +74,13 @@ void forces_apply_fluid(const DfsphProblem *problem, Dfsph *dfsph) {
     const StrainJob strain = {.pairs = &problem->rows->pairs,
                               .velocity = (const Float4 *)particles->velocity,
                               .strain = {dfsph->answer, dfsph->spare}};
-    const ForceJob job = {
-        .pairs = &problem->rows->pairs,
-        .velocity = (const Float4 *)particles->velocity,
-        .result = dfsph->guess,
-        .gravity_dt = {dt * params->gravity[0], dt * params->gravity[1], dt * params->gravity[2]},
-        .viscosity = params->viscosity,
-        .calming = params->calming,
-        .calming_limit = dt * params->calming_limit,
-        .strain = {(const Float4 *)dfsph->answer, (const Float4 *)dfsph->spare}};
+    const ForceJob job = {.pairs = &problem->rows->pairs,
+                          .velocity = (const Float4 *)particles->velocity,
+                          .result = particles->back[PARTICLE_velocity].data,
+                          .viscosity = params->viscosity,
+                          .calming = params->calming,
+                          .calming_limit = dt * params->calming_limit,
+                          .strain = {(const Float4 *)dfsph->answer, (const Float4 *)dfsph->spare}};
     const uint32_t blocks = particles_blocks(particles);
 #pragma omp parallel num_threads(problem->threads)
     {
@@ -95,17 +93,15 @@ void forces_apply_fluid(const DfsphProblem *problem, Dfsph *dfsph) {
         for (uint32_t block = 0; block < blocks; block++)
             problem->passes->forces(&job, block);
 #pragma omp for schedule(static)
-        for (uint32_t i = 0; i < particles->count; i++)
-            if (problem->held == NULL || !problem->held[i])
-                memcpy(particles->velocity[i], dfsph->guess[i], sizeof(Float4));
+        for (uint32_t i = 0; i < (problem->held != NULL ? particles->count : 0); i++)
+            if (problem->held[i])
+                memcpy(job.result[i], particles->velocity[i], sizeof(Float4));
     }
+    particles_swap(particles, PARTICLE_velocity);
 }
 
 void forces_apply(SkiffSim *sim, const DfsphProblem *problem) {
-    const float dt = sim->params.time_step;
     forces_apply_fluid(problem, &sim->dfsph);
-    for (int b = 0; b < sim->body_count; b++)
-        body_push(&sim->bodies[b], sim->params.gravity, sim->time, (double)dt);
     if (sim->params.wall_friction > 0.0f)
         apply_friction(sim);
 }

@@ -167,6 +167,7 @@ static void arrange_groups(Grid *grid, const Particles *particles, uint32_t kept
             key[k] = k < count ? row_key(particles->row_size[member[k]], k) : INT32_MAX;
         for (uint32_t k = 0; k < count; k++) {
             int32_t rank = 0;
+#pragma omp simd reduction(+ : rank)
             for (uint32_t other = 0; other < ROW_GROUP; other++)
                 rank += key[other] < key[k];
             grid->order[begin + (uint32_t)rank] = member[k];

@@ -66,6 +66,13 @@ static void permute_field(const ParticleFieldInfo *info, const void *from, void 
     }
 }
 
+void particles_swap(Particles *particles, ParticleFieldId field) {
+    const Buffer front = particles->front[field];
+    particles->front[field] = particles->back[field];
+    particles->back[field] = front;
+    particles_bind(particles);
+}
+
 void particles_permute(Particles *particles, const uint32_t *order, uint32_t count, int threads) {
     assert(count <= particles->capacity);
     const uint32_t blocks = (count + BLOCK - 1) / BLOCK;
@@ -80,12 +87,9 @@ void particles_permute(Particles *particles, const uint32_t *order, uint32_t cou
         const size_t size = particle_fields[f].size;
         memset((char *)particles->back[f].data + count * size, 0,
                ((size_t)blocks * BLOCK + SLICE - count) * size);
-        const Buffer swap = particles->front[f];
-        particles->front[f] = particles->back[f];
-        particles->back[f] = swap;
+        particles_swap(particles, (ParticleFieldId)f);
     }
     particles->count = count;
-    particles_bind(particles);
 }
 
 void particles_remove(Particles *particles, const uint32_t *gone, uint32_t gone_count, float *scalar) {

@@ -52,6 +52,9 @@ void *particles_data(Particles *particles, ParticleFieldId field);
  * after them. */
 void particles_permute(Particles *particles, const uint32_t *order, uint32_t count, int threads);
 
+/* What has been written to the field's back buffer becomes its values. */
+void particles_swap(Particles *particles, ParticleFieldId field);
+
 /* Takes out the particles `gone` (ascending); the last of those that stay take their places, and take their
  * values of `scalar` with them. Zeroes the padding after them. */
 void particles_remove(Particles *particles, const uint32_t *gone, uint32_t gone_count, float *scalar);

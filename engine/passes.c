@@ -23,8 +23,9 @@ static inline void own_arm(const PairData *pairs, Vf x, Vf y, Vf z, Vf arm[3]) {
     arm[2] = vf_sub(z, vf_set(pairs->centre[2]));
 }
 
-static inline void accelerate_slices(const PairData *pairs, const AccelerateJob *job, uint32_t block,
-                                     const bool wide) {
+/* Inlined where `wide` is known: it is asked in the innermost loop. */
+static inline __attribute__((always_inline)) void
+accelerate_slices(const PairData *pairs, const AccelerateJob *job, uint32_t block, const bool wide) {
     const Vf unit = vf_set(-job->scale * pairs->factor_unit), scale = vf_set(job->scale);
     for (uint32_t slice = block * BLOCK_SLICES; slice < (block + 1) * BLOCK_SLICES; slice++) {
         const uint32_t first = slice * SLICE, begin = pairs->slices[slice].start;
@@ -42,8 +43,12 @@ static inline void accelerate_slices(const PairData *pairs, const AccelerateJob 
         }
         Vf gx, gy, gz, unused, bx = vf_zero(), by = vf_zero(), bz = vf_zero();
         vf_load4(pairs->gradient_sum + first, &gx, &gy, &gz, &unused);
-        if (job->base != NULL)
+        if (job->base != NULL) {
             vf_load4(job->base + first, &bx, &by, &bz, &unused);
+            bx = vf_add(bx, vf_set(job->push[0]));
+            by = vf_add(by, vf_set(job->push[1]));
+            bz = vf_add(bz, vf_set(job->push[2]));
+        }
         own_p = vf_mul(scale, own_p);
         x = vf_fma(own_p, gx, vf_fma(x, unit, bx));
         y = vf_fma(own_p, gy, vf_fma(y, unit, by));
@@ -80,6 +85,8 @@ static void accelerate_corrected(const PairData *pairs, const AccelerateJob *job
         vf_load4(pairs->gradient_sum + first, &g[0], &g[1], &g[2], &unused);
         if (job->base != NULL)
             vf_load4(job->base + first, &base[0], &base[1], &base[2], &unused);
+        for (int k = 0; job->base != NULL && k < 3; k++)
+            base[k] = vf_add(base[k], vf_set(job->push[k]));
         own_p = vf_mul(scale, own_p);
         own_arm(pairs, own[0], own[1], own[2], arm);
         for (int k = 0; k < 3; k++) {
@@ -99,8 +106,8 @@ static void accelerate(const PairData *pairs, const AccelerateJob *job, uint32_t
         accelerate_slices(pairs, job, block, false);
 }
 
-static inline void divergence_slices(const PairData *pairs, const Float4 *v, float *result, uint32_t block,
-                                     const bool wide) {
+static inline __attribute__((always_inline)) void
+divergence_slices(const PairData *pairs, const Float4 *v, float *result, uint32_t block, const bool wide) {
     for (uint32_t slice = block * BLOCK_SLICES; slice < (block + 1) * BLOCK_SLICES; slice++) {
         const uint32_t first = slice * SLICE, begin = pairs->slices[slice].start;
         const Float4 *slice_v = v + first;
@@ -272,7 +279,7 @@ static void correct(const CorrectionJob *job, uint32_t block) {
     }
 }
 
-/* ---- Gravity, viscosity and calming ---- */
+/* ---- Viscosity and calming ---- */
 
 static inline Vf vf_load_weight(const PairData *pairs, uint32_t entry) {
     return vf_load_i16(pairs->weights + (size_t)entry * SLICE);
@@ -448,8 +455,7 @@ static void forces(const ForceJob *job, uint32_t block) {
         for (; entry < end; entry++)
             viscous_pair(job, entry, first, own_v, e, sum);
         for (int k = 0; k < 3; k++)
-            sum[k] = vf_fma(calming, calm_sum[k],
-                            vf_fma(viscous, sum[k], vf_add(own_v[k], vf_set(job->gravity_dt[k]))));
+            sum[k] = vf_fma(calming, calm_sum[k], vf_fma(viscous, sum[k], own_v[k]));
         vf_store4(job->result + first, sum[0], sum[1], sum[2], vf_zero());
     }
 }

@@ -210,6 +210,7 @@ static inline float vector_moment(const PairData *pairs, const float *position, 
 typedef struct AccelerateJob {
     const Float4 *operand; /* position and p of every particle */
     const Float4 *base;
+    float push[3]; /* added to the base */
     float scale;
     Float4 *result; /* with moments */
 } AccelerateJob;
@@ -217,8 +218,7 @@ typedef struct AccelerateJob {
 typedef struct ForceJob {
     const PairData *pairs;
     const Float4 *velocity; /* in */
-    Float4 *result;         /* out: velocity + gravity_dt - viscosity sum_j V W_ij (v_i - v_j) */
-    float gravity_dt[3];
+    Float4 *result;         /* out: velocity - viscosity sum_j V W_ij (v_i - v_j) */
     float viscosity;
     float calming;           /* share of the velocity that is no part of a linear field taken away; 0: none */
     float calming_limit;     /* m/s: at most this of the difference between two particles */
@@ -241,8 +241,8 @@ typedef struct Passes {
     /* Boundary terms of a block's particles; contacts go to scratch->contacts. Returns how many, or -1 with
      * *fault. */
     int (*boundary)(const BoundaryJob *job, uint32_t block, Scratch *scratch, uint32_t *fault);
-    /* result_i = base_i + scale (D^T p)_i, (D^T p)_i = p_i G_i + sum_j p_j V grad W_ij. base NULL: 0; base
-     * may be result. Its fourth place is not read. */
+    /* result_i = base_i + push + scale (D^T p)_i, (D^T p)_i = p_i G_i + sum_j p_j V grad W_ij. base NULL: 0,
+     * without push; base may be result. Its fourth place is not read. */
     void (*accelerate)(const PairData *pairs, const AccelerateJob *job, uint32_t block);
     /* result_i = (D v)_i = v_i . G_i - sum_j v_j . V grad W_ij, v with moments; contacts with moving bodies
      * are the caller's */
@@ -251,7 +251,7 @@ typedef struct Passes {
     void (*correct)(const CorrectionJob *job, uint32_t block);
     /* velocity gradients by weighted least squares over the neighbours */
     void (*strain)(const StrainJob *job, uint32_t block);
-    /* gravity, XSPH viscosity and calming, which conserve momentum exactly */
+    /* XSPH viscosity and calming, which conserve momentum exactly */
     void (*forces)(const ForceJob *job, uint32_t block);
 } Passes;
 

@@ -1,6 +1,6 @@
 /* Last stage of a fill: what was selected settles [Carensac2023 sec. 3.3]. And the fill as a whole.
  *
- * A step: search, (divergence solve,) gravity and viscosity, density solve, damping, motion: the solver's
+ * A step: search, viscosity, (divergence solve,) gravity and density solve, damping, motion: the solver's
  * own, but not calming: what settles is all disorder, and losing it every step means creeping to its place
  * where it could fall. Bodies are held. Errors are means over the active particles.
  *
@@ -34,6 +34,9 @@ static const float HELD_SHARE = 0.15f;
 /* Of what two particles lack to the distance of a radius, the share that each moves a step. */
 static const float PART_SHARE = 0.1f;
 
+/* Motion in one step, r, of a particle that is not yet where it will stay. */
+static const float FAST_MOTION = 0.1f;
+
 /* Share of a density error that a step corrects, and of the velocity that it keeps, while a column settles.
  */
 static const float COLUMN_SOFTENING = 0.25f, COLUMN_RETENTION = 0.8f;
@@ -52,6 +55,7 @@ typedef struct Settle {
     const uint8_t *held;   /* [particles] 1: does not move; or NULL */
     uint32_t active;
     int steps;     /* at most */
+    int patience;  /* further ones, while a particle moves more than FAST_MOTION */
     bool layer;    /* only what is beside solids and existing water: in the cloud */
     bool yields;   /* existing water beside the new moves too */
     bool tracks;   /* where existing water was before the sorts: RestCloud.whence */
@@ -390,19 +394,20 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
                                   .boundary = settle->boundary,
                                   .particles = settle->particles,
                                   .held = settle->held,
+                                  .density_alone = !params->rest_divergence,
                                   /* Beside water that stands still a tighter stop presses the new into it:
                                    * single particles left at 0.4 m/s where it is 0.16. */
                                   .settling = settle->held != NULL,
                                   .evaluated_count = settle->active,
                                   .threads = settle->sim->threads};
     scale_pressures(settle->particles, scale * scale, problem.threads);
-    bool calm = false;
-    for (int step = 0; step < settle->steps && !calm; step++, fill->steps++) {
+    bool calm = false, fast = false;
+    for (int step = 0; step < settle->steps + (fast ? settle->patience : 0) && !calm; step++, fill->steps++) {
         if (!search(settle, first_id, err))
             return false;
+        forces_apply_fluid(&problem, settle->dfsph);
         if (params->rest_divergence)
             dfsph_solve(settle->dfsph, &problem, SOLVE_DIVERGENCE);
-        forces_apply_fluid(&problem, settle->dfsph);
         if (params->rest_settle != REST_SETTLE_CANDIDATES)
             part_pairs(settle);
         if (settle->held != NULL)
@@ -411,6 +416,7 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
         const SpeedSums speeds = measure_speeds(settle);
         fill->mean_speed = speeds.mean;
         fill->max_speed = speeds.max;
+        fast = speeds.max * (double)params->time_step >= (double)(FAST_MOTION * params->particle_radius);
         calm = step + 1 >= params->rest_min_steps && speeds.max < (double)params->rest_max_speed * unit &&
                speeds.mean < (double)params->rest_mean_speed * unit;
         move_active(settle, kept_share(params, step));
@@ -541,7 +547,8 @@ static bool settle_water(SkiffSim *sim, float surface, uint64_t first_id, SkiffF
     settle.steps = layer_done ? 0 : params->rest_steps;
     bool good = (!settle.tracks || stop_existing(sim, first_id, err)) &&
                 run_steps(&settle, search_all, first_id, fill, err);
-    settle.steps = params->rest_final_steps;
+    /* a particle that was held between two layers beside what is taken out falls into one of them only now */
+    settle.steps = settle.patience = params->rest_final_steps;
     settle.yields = params->rest_settle == REST_SETTLE_SHELL;
     good = good && run_steps(&settle, search_all, first_id, fill, err);
     if (good && settle.tracks)
@@ -591,7 +598,7 @@ static void show(SkiffSim *sim, uint64_t first_id, bool all) {
     for (uint32_t i = 0; !all && i < sim->particles.count; i++)
         if (sim->particles.id[i] >= first_id)
             density[i] = 0.0f;
-    sim_add_pressures(sim);
+    sim_add_pressures(sim, sim->pressure.data);
 }
 
 bool rest_check_tile(SkiffSim *sim, Err *err) {

@@ -58,7 +58,7 @@ struct SkiffSim {
 
     /* solves */
     Dfsph dfsph;
-    Buffer pressure;      /* [particles] Pa, of both solves of the last step */
+    Buffer pressure;      /* [particles] Pa, unknowns of both solves of the last step: see pressure.c */
     Buffer object_forces; /* [objects][6] force (N) and torque about the object's centre (N m) of the last
                              step */
 
@@ -94,8 +94,8 @@ void drives_apply(SkiffSim *sim);
 bool probes_make(SkiffSim *sim, const SkiffDef *def, Err *err);
 void probes_free(SkiffSim *sim);
 
-/* sim->pressure from the pressures of both solves. */
-void sim_add_pressures(SkiffSim *sim);
+/* [particles] The unknowns of both solves together, Pa. */
+void sim_add_pressures(const SkiffSim *sim, float *total);
 /* Is p within `margin` (m) of a body? Bodies touch water too. */
 bool sim_near_body(const SkiffSim *sim, const float p[3], double margin);
 

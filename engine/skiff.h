@@ -260,11 +260,19 @@ typedef struct SkiffParticles {
     const float (*position)[4]; /* m; [3] is unused */
     const float (*velocity)[4]; /* m/s */
     const float *density;       /* rho / rho0, at the start of the last step; 0 before a particle's first */
-    const float *pressure;      /* Pa, mean over the last step; before it, of water at rest */
-    const uint64_t *id;         /* never reused */
-    const double *birth;        /* s */
+    const float *unknown; /* Pa, what the solves of the last step found; before it, of water at rest. Forces
+                             come of it; beside walls it is more than the pressure: see skiff_pressure */
+    const uint64_t *id;   /* never reused */
+    const double *birth;  /* s */
 } SkiffParticles;
 SkiffParticles skiff_particles(const SkiffSim *sim);
+
+/* Pressure of every particle, Pa, mean over the last step; before it, of water at rest. It takes a search for
+ * neighbours, which no step pays for. The gradient of p(x) = sum_j V P_j W(x - x_j), P the unknowns above, is
+ * what accelerates the water, and its value at a wall is the force on the wall's area (pressure.c has the
+ * derivation): it is hydrostatic in water at rest up to floors, walls and corners. ERR_INPUT: no memory;
+ * ERR_DIVERGED: a particle is nowhere. */
+bool skiff_pressure(const SkiffSim *sim, float *pressure, Err *err);
 
 /* Samples of walls and of bodies. Volumes after [Akinci2012]. */
 typedef struct SkiffBoundary {

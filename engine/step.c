@@ -1,9 +1,11 @@
 /* ONE STEP, TOP TO BOTTOM. Read this first.
  *
  * [Carensac2023 alg. 2], with the pressure solves of dfsph.c:
- *   thrust and steering -> emit blocks -> move body samples -> sort -> search -> boundary terms -> divergence
- * solve -> gravity and viscosity -> density solve -> advance.
- * pressureSolver split has no divergence solve; its density solve is two, for velocities and for positions.
+ *   thrust and steering -> emit blocks -> move body samples -> sort -> search -> boundary terms -> viscosity
+ * -> divergence solve -> gravity and density solve -> advance. The paper has its divergence solve before
+ * viscosity. After it, nothing but gravity happens to the velocities until the density solve, and one
+ * application of the pressures' gradients serves both. pressureSolver split has no divergence solve; its
+ * density solve is two, for velocities and for positions.
  */
 #define _POSIX_C_SOURCE 200809L
 #include "sim.h"
@@ -106,16 +108,17 @@ static void solve_flow(SkiffSim *sim) {
 }
 
 static void solve_density(SkiffSim *sim) {
+    const DfsphProblem problem = step_problem(sim);
+    for (int b = 0; b < sim->body_count; b++)
+        body_push(&sim->bodies[b], sim->params.gravity, sim->time, (double)sim->params.time_step);
     if (splits(sim))
         solve_flow(sim);
-    const DfsphProblem problem = step_problem(sim);
     const SolveResult result = dfsph_solve(&sim->dfsph, &problem, splits(sim) ? SOLVE_SHIFT : SOLVE_DENSITY);
     sim->stats.density_iterations = result.iterations;
     sim->stats.residual_percent = 100.0 * result.residual;
 }
 
-void sim_add_pressures(SkiffSim *sim) {
-    float *total = sim->pressure.data;
+void sim_add_pressures(const SkiffSim *sim, float *total) {
     const Particles *particles = &sim->particles;
     const float unit = sim->params.rest_density / (sim->params.time_step * sim->params.time_step);
     const float second = splits(sim) ? 0.0f : 1.0f; /* what shifts particles is no pressure */
@@ -126,8 +129,8 @@ void sim_add_pressures(SkiffSim *sim) {
 
 /* Pressure of this step and the forces of the fluid on tank and bodies. */
 static void measure_forces(SkiffSim *sim) {
-    sim_add_pressures(sim);
-    const float *total = sim->pressure.data;
+    float *total = sim->pressure.data;
+    sim_add_pressures(sim, total);
     const Particles *particles = &sim->particles;
     double(*forces)[6] = sim->object_forces.data;
     boundary_impulse(&sim->boundary, total, 1, particles_blocks(particles), forces, sim->threads);
@@ -283,8 +286,8 @@ bool skiff_step(SkiffSim *sim, Err *err) {
     PHASE_RUN(SORT, good = sort_particles(sim, err));
     PHASE_RUN(SEARCH, good = find_neighbours(sim, err));
     PHASE_RUN(BOUNDARY, good = add_boundary(sim, err));
-    PHASE_RUN(DIVERGENCE, solve_divergence(sim));
     PHASE_RUN(FORCES, apply_forces(sim));
+    PHASE_RUN(DIVERGENCE, solve_divergence(sim));
     PHASE_RUN(PRESSURE, solve_density(sim));
     PHASE_RUN(ADVANCE, measure_forces(sim); advance(sim); good = check(sim, err));
     PHASE_RUN(ABSORB, good = absorb_waves(sim, err));

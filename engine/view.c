@@ -38,7 +38,7 @@ SkiffParticles skiff_particles(const SkiffSim *sim) {
                            .position = (const float(*)[4])particles->position,
                            .velocity = (const float(*)[4])particles->velocity,
                            .density = sim->rows.density.data,
-                           .pressure = sim->pressure.data,
+                           .unknown = sim->pressure.data,
                            .id = particles->id,
                            .birth = particles->birth};
     memcpy(view.origin, sim->origin, sizeof view.origin);

@@ -20,25 +20,9 @@ enum { LANES = 16 };
 
 typedef float Float4[4];
 
-static inline const float *float4_at(const Float4 *base, ptrdiff_t halves) {
-    return (const float *)((const char *)base + 8 * halves);
+static inline const float *float4_at(const Float4 *base, int32_t halves) {
+    return (const float *)((const char *)base + 8 * (ptrdiff_t)halves);
 }
-
-#if defined(SIMD_AVX512) || defined(SIMD_AVX2)
-/* Two offsets by one load: the passes wait for the load units. */
-static inline void two_offsets_i16(const int16_t *halves, ptrdiff_t two[2]) {
-    int32_t both;
-    memcpy(&both, halves, sizeof both);
-    two[0] = (int16_t)both;
-    two[1] = both >> 16;
-}
-static inline void two_offsets_i32(const int32_t *halves, ptrdiff_t two[2]) {
-    int64_t both;
-    memcpy(&both, halves, sizeof both);
-    two[0] = (int32_t)both;
-    two[1] = (ptrdiff_t)(both >> 32);
-}
-#endif
 
 #if defined(SIMD_AVX512)
 
@@ -179,25 +163,20 @@ static inline void vf_transpose4(__m512 r[4], Vf *x, Vf *y, Vf *z, Vf *w) {
  * units to the transpose, while taking them out of a register costs as much as the rest. And they count half
  * a Float4: scaled by eight an offset is part of an address, by sixteen it would need an instruction of its
  * own. */
-#define GATHER4(base, two_offsets, halves, x, y, z, w)                                                       \
+#define GATHER4(base, halves, x, y, z, w)                                                                    \
     __m512 r[4];                                                                                             \
-    for (int k = 0; k < 4; k += 2) {                                                                         \
-        ptrdiff_t at[4][2];                                                                                  \
-        for (int q = 0; q < 4; q++)                                                                          \
-            two_offsets(halves + 4 * q + k, at[q]);                                                          \
-        for (int h = 0; h < 2; h++) {                                                                        \
-            r[k + h] = _mm512_castps128_ps512(_mm_loadu_ps(float4_at(base, at[0][h])));                      \
-            r[k + h] = _mm512_insertf32x4(r[k + h], _mm_loadu_ps(float4_at(base, at[1][h])), 1);             \
-            r[k + h] = _mm512_insertf32x4(r[k + h], _mm_loadu_ps(float4_at(base, at[2][h])), 2);             \
-            r[k + h] = _mm512_insertf32x4(r[k + h], _mm_loadu_ps(float4_at(base, at[3][h])), 3);             \
-        }                                                                                                    \
+    for (int k = 0; k < 4; k++) {                                                                            \
+        r[k] = _mm512_castps128_ps512(_mm_loadu_ps(float4_at(base, halves[k])));                             \
+        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(float4_at(base, halves[4 + k])), 1);                    \
+        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(float4_at(base, halves[8 + k])), 2);                    \
+        r[k] = _mm512_insertf32x4(r[k], _mm_loadu_ps(float4_at(base, halves[12 + k])), 3);                   \
     }                                                                                                        \
     vf_transpose4(r, x, y, z, w)
 static inline void vf_gather4_i32(const Float4 *base, const int32_t *halves, Vf *x, Vf *y, Vf *z, Vf *w) {
-    GATHER4(base, two_offsets_i32, halves, x, y, z, w);
+    GATHER4(base, halves, x, y, z, w);
 }
 static inline void vf_gather4_i16(const Float4 *base, const int16_t *halves, Vf *x, Vf *y, Vf *z, Vf *w) {
-    GATHER4(base, two_offsets_i16, halves, x, y, z, w);
+    GATHER4(base, halves, x, y, z, w);
 }
 #undef GATHER4
 /* Sixteen consecutive Float4 to four registers. */
@@ -381,19 +360,14 @@ static inline void avx2_transpose4(const __m256 r[4], __m256 out[4]) {
     out[2] = _mm256_shuffle_ps(t1, t3, 0x44);
     out[3] = _mm256_shuffle_ps(t1, t3, 0xEE);
 }
-#define GATHER4(base, two_offsets, halves, x, y, z, w)                                                       \
+#define GATHER4(base, halves, x, y, z, w)                                                                    \
     __m256 out[2][4];                                                                                        \
     for (int half = 0; half < 2; half++) {                                                                   \
         __m256 r[4];                                                                                         \
-        for (int k = 0; k < 4; k += 2) {                                                                     \
-            ptrdiff_t low[2], high[2];                                                                       \
-            two_offsets(halves + 8 * half + k, low);                                                         \
-            two_offsets(halves + 8 * half + 4 + k, high);                                                    \
-            for (int h = 0; h < 2; h++)                                                                      \
-                r[k + h] =                                                                                   \
-                    _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(float4_at(base, low[h]))),      \
-                                         _mm_loadu_ps(float4_at(base, high[h])), 1);                         \
-        }                                                                                                    \
+        for (int k = 0; k < 4; k++)                                                                          \
+            r[k] = _mm256_insertf128_ps(                                                                     \
+                _mm256_castps128_ps256(_mm_loadu_ps(float4_at(base, halves[8 * half + k]))),                 \
+                _mm_loadu_ps(float4_at(base, halves[8 * half + 4 + k])), 1);                                 \
         avx2_transpose4(r, out[half]);                                                                       \
     }                                                                                                        \
     *x = VF(out[0][0], out[1][0]);                                                                           \
@@ -401,14 +375,14 @@ static inline void avx2_transpose4(const __m256 r[4], __m256 out[4]) {
     *z = VF(out[0][2], out[1][2]);                                                                           \
     *w = VF(out[0][3], out[1][3])
 static inline void vf_gather4_i32(const Float4 *base, const int32_t *halves, Vf *x, Vf *y, Vf *z, Vf *w) {
-    GATHER4(base, two_offsets_i32, halves, x, y, z, w);
+    GATHER4(base, halves, x, y, z, w);
 }
 static inline void vf_gather4_i16(const Float4 *base, const int16_t *halves, Vf *x, Vf *y, Vf *z, Vf *w) {
-    GATHER4(base, two_offsets_i16, halves, x, y, z, w);
+    GATHER4(base, halves, x, y, z, w);
 }
 static inline void vf_load4(const Float4 *p, Vf *x, Vf *y, Vf *z, Vf *w) {
     static const int32_t in_order[LANES] = {0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30};
-    vf_gather4_i32(p, in_order, x, y, z, w);
+    GATHER4(p, in_order, x, y, z, w);
 }
 #undef GATHER4
 static inline void avx2_store4(Float4 *p, __m256 x, __m256 y, __m256 z, __m256 w) {
@@ -436,21 +410,40 @@ static inline float vf_sum(Vf v) {
     q = _mm_add_ps(q, _mm_movehl_ps(q, q));
     return _mm_cvtss_f32(_mm_add_ss(q, _mm_movehdup_ps(q)));
 }
+/* Four lanes at a time, by a table of byte shuffles: walking the bits costs a wrong guess of their number. */
+#define BYTES(lane) 4 * (lane), 4 * (lane) + 1, 4 * (lane) + 2, 4 * (lane) + 3
+static const uint8_t avx2_compress_bytes[16][16] = {
+    {0},
+    {BYTES(0)},
+    {BYTES(1)},
+    {BYTES(0), BYTES(1)},
+    {BYTES(2)},
+    {BYTES(0), BYTES(2)},
+    {BYTES(1), BYTES(2)},
+    {BYTES(0), BYTES(1), BYTES(2)},
+    {BYTES(3)},
+    {BYTES(0), BYTES(3)},
+    {BYTES(1), BYTES(3)},
+    {BYTES(0), BYTES(1), BYTES(3)},
+    {BYTES(2), BYTES(3)},
+    {BYTES(0), BYTES(2), BYTES(3)},
+    {BYTES(1), BYTES(2), BYTES(3)},
+    {BYTES(0), BYTES(1), BYTES(2), BYTES(3)},
+};
+#undef BYTES
 static inline int vi_compress(int32_t *out, Vi v, Vm m) {
-    int32_t lane[LANES];
-    vi_store(lane, v);
+    const __m128i quads[4] = {_mm256_castsi256_si128(v.a), _mm256_extracti128_si256(v.a, 1),
+                              _mm256_castsi256_si128(v.b), _mm256_extracti128_si256(v.b, 1)};
     int n = 0;
-    for (; m != 0; m &= m - 1) /* few lanes are set: walking the bits beats a table of shuffles */
-        out[n++] = lane[__builtin_ctz(m)];
+    for (int q = 0; q < 4; q++, m >>= 4) {
+        const __m128i bytes = _mm_loadu_si128((const __m128i *)avx2_compress_bytes[m & 15]);
+        _mm_storeu_si128((__m128i *)(out + n), _mm_shuffle_epi8(quads[q], bytes));
+        n += __builtin_popcount(m & 15);
+    }
     return n;
 }
 static inline int vf_compress(float *out, Vf v, Vm m) {
-    float lane[LANES];
-    vf_store(lane, v);
-    int n = 0;
-    for (; m != 0; m &= m - 1)
-        out[n++] = lane[__builtin_ctz(m)];
-    return n;
+    return vi_compress((int32_t *)(void *)out, (Vi){_mm256_castps_si256(v.a), _mm256_castps_si256(v.b)}, m);
 }
 
 #else

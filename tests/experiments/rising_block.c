@@ -33,6 +33,13 @@ static double rise_time(const double *times, const double *heights, int count, d
     return NAN;
 }
 
+/* Speed on the way up through a height: mean over the millimetre to either side. */
+static double rise_speed(const double *times, const double *heights, int count, double level) {
+    const double side = 0.001;
+    return 2.0 * side /
+           (rise_time(times, heights, count, level + side) - rise_time(times, heights, count, level - side));
+}
+
 /* Index of the first extreme after `from` that nothing within 0.1 s exceeds; sign +1: maximum. -1 when there
  * is none. */
 static int extreme_after(const double *times, const double *heights, int count, double from, double sign) {
@@ -123,5 +130,8 @@ int main(int argc, char **argv) {
     experiment_note(&experiment, "mean height, 0.55 to 1.25 s after 30 mm", mean, "m");
     experiment_note(&experiment, "the same in the experiment", wu_mean, "m");
     experiment_note(&experiment, "time from the release to 30 mm", here - 0.3, "s");
+    experiment_note(&experiment, "speed at 30 mm", rise_speed(t, y, count, 0.030), "m/s");
+    experiment_note(&experiment, "the same in the experiment", rise_speed(wu.x, wu.y, wu.count, 0.030),
+                    "m/s");
     return experiment_end(&experiment);
 }

@@ -229,15 +229,21 @@ static uint64_t all_bits(const Passes *passes, bool wide) {
     static Cloud cloud;
     cloud_make(&cloud, passes, wide);
     cloud_correct(&cloud, passes);
-    static Float4 acceleration[COUNT + BLOCK], corrected[COUNT + BLOCK], velocity[COUNT + BLOCK];
+    static Float4 acceleration[COUNT + BLOCK], corrected[COUNT + BLOCK], velocity[COUNT + BLOCK],
+        fields[2][COUNT + BLOCK];
     static float divergence[COUNT + BLOCK], corrected_divergence[COUNT + BLOCK];
     const ForceJob job = {.pairs = &cloud.rows.pairs,
                           .velocity = (const Float4 *)cloud.particles.velocity,
                           .result = velocity,
-                          .gravity_dt = {0, -0.03f, 0},
-                          .viscosity = 0.02f};
+                          .viscosity = 0.02f,
+                          .calming = 0.7f,
+                          .calming_limit = 0.1f,
+                          .strain = {(const Float4 *)fields[0], (const Float4 *)fields[1]}};
+    const StrainJob strain = {
+        .pairs = &cloud.rows.pairs, .velocity = job.velocity, .strain = {fields[0], fields[1]}};
     const AccelerateJob push = {.operand = (const Float4 *)cloud.operand,
                                 .base = (const Float4 *)cloud.particles.velocity,
+                                .push = {0.1f, -0.03f, 0.2f},
                                 .scale = -3.0f,
                                 .result = acceleration};
     AccelerateJob push_corrected = push;
@@ -248,8 +254,10 @@ static uint64_t all_bits(const Passes *passes, bool wide) {
                            corrected_divergence, block);
         passes->accelerate(&cloud.rows.pairs, &push, block);
         passes->divergence(&cloud.rows.pairs, (const Float4 *)cloud.particles.velocity, divergence, block);
-        passes->forces(&job, block);
+        passes->strain(&strain, block);
     }
+    for (uint32_t block = 0; block < particles_blocks(&cloud.particles); block++)
+        passes->forces(&job, block);
     const uint64_t hash =
         bits(cloud.rows.pairs.density, COUNT * sizeof(float)) * 3 +
         bits(cloud.rows.pairs.gradient_sum, COUNT * sizeof(Float4)) * 5 +
@@ -343,6 +351,8 @@ static void test_sort(void **state) {
             for (int k = 0; k < 3; k++)
                 p[k] = (float)random_unit(&seed);
             particles_append(&particles, p, (const float[3]){0}, 0.0);
+            particles.row_size[i] =
+                (uint32_t)(30 + 8 * random_unit(&seed)) << 16 | (uint32_t)(10 + 4 * random_unit(&seed));
         }
         const GridBounds domain = {{0, 0, 0}, {1, 0.9f, 1}};
         uint32_t removed = 0;
@@ -351,12 +361,20 @@ static void test_sort(void **state) {
         assert_true(grid_sort(&grid, &particles, 0.1f, &domain, &removed, threads, &err));
         assert_int_equal(particles.count + removed, 5000);
         assert_in_range(removed, 400, 600);
-        for (uint32_t i = 1; i < particles.count; i++) {
-            assert_true(grid.cell[i] >= grid.cell[i - 1]);
-            if (grid.cell[i] == grid.cell[i - 1])
-                assert_true(particles.id[i] > particles.id[i - 1]);
-            assert_int_equal(grid.cell[i], grid_cell_of(&grid.cells, particles.position[i]));
+        for (uint32_t k = 0; k < particles.count; k++) { /* in the order of cells, group by group */
+            const uint32_t i = grid.member[k];
+            assert_int_equal(i / ROW_GROUP, k / ROW_GROUP);
+            assert_int_equal(grid.cell[k], grid_cell_of(&grid.cells, particles.position[i]));
+            assert_true(grid.x[k] == particles.position[i][0] && grid.y[k] == particles.position[i][1] &&
+                        grid.z[k] == particles.position[i][2]);
+            if (k > 0) {
+                assert_true(grid.cell[k] >= grid.cell[k - 1]);
+                if (grid.cell[k] == grid.cell[k - 1])
+                    assert_true(particles.id[i] > particles.id[grid.member[k - 1]]);
+            }
         }
+        for (uint32_t i = 1; i < particles.count; i++) /* within a group by the size of rows */
+            assert_true(i % ROW_GROUP == 0 || particles.row_size[i] >= particles.row_size[i - 1]);
         const uint64_t hash = bits(particles.position, particles.count * sizeof(Float4));
         assert_true(threads == 1 || hash == expected);
         expected = hash;

@@ -220,7 +220,7 @@ static void refill(SkiffSim *sim, int settle) {
         const bool fresh = particles.id[i] >= end;
         moving += fresh;
         assert_true(fresh == (particles.velocity[i][2] == 0.5f)); /* what a block gives goes to its own */
-        assert_true(particles.pressure[i] >= 0.0f && particles.density[i] >= 0.0f);
+        assert_true(particles.unknown[i] >= 0.0f && particles.density[i] >= 0.0f);
     }
     assert_int_equal(moving, fill->particles);
     if (settle !=

@@ -1,0 +1,125 @@
+/* What the pressure of a particle is.
+ *
+ * The unknown P_i of the solves is a multiplier: what it costs to keep one particle's density at rest
+ * density. Walls and bodies take part in that density but have no unknown of their own, so a pair of fluid
+ * particles is pressed apart by P_i + P_j, a particle and a wall by P_i alone. Beside a wall the multipliers
+ * therefore exceed the pressure: 1.5 to 1.7 times on a floor, twice in a corner. (The same in words of
+ * stress: per particle, the fluid's bonds carry 0.6 of the pressure across the layer on the floor, and the
+ * wall's carry the rest in a gap that belongs to no particle.)
+ *
+ * The force on a particle is, with the density sum rho of fluid, walls and bodies,
+ *   -V (P_i grad rho(x_i) + grad p(x_i)),   p(x) = sum_j V P_j W(x - x_j),
+ * j over the fluid alone, itself included. The density is what the solve keeps constant, so its gradient has
+ * no part in the mean, and what drives the water is the gradient of p: that is the pressure. It needs no wall
+ * term and no division by the sum of the weights. In the continuum, beside a plane wall at 0, the force on
+ * the wall is int P(y) W1(y) dy = p(0), and the momentum that passes through any plane at y is p(y): pressure
+ * by the method of planes [Todd, Evans & Daivis 1995] and p are the same. Measured in tests/bench/NOTES.md.
+ *
+ * Positions are those of now; the unknowns acted during the last step, and what moves in one is little. */
+#include "sim.h"
+
+#include <stdlib.h>
+
+/* The fluid by cells of edge h, copied in order: the three cells of a column that a particle feels are one
+ * run. */
+typedef struct PressureCloud {
+    CellGrid cells;
+    uint32_t *start; /* [cells + 1] */
+    uint32_t *order; /* [count] particle k of the cloud is the simulation's order[k] */
+    Float4 *points;  /* [count] position, unknown (Pa) */
+} PressureCloud;
+
+static void cloud_free(PressureCloud *cloud) {
+    free(cloud->start);
+    free(cloud->order);
+    free(cloud->points);
+}
+
+static bool cloud_layout(const SkiffSim *sim, PressureCloud *cloud, Err *err) {
+    const Particles *particles = &sim->particles;
+    GridBounds bounds = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    for (uint32_t i = 0; i < particles->count; i++)
+        for (int k = 0; k < 3; k++) {
+            const float x = particles->position[i][k];
+            if (!isfinite(x))
+                return err_set(err, ERR_DIVERGED, "particle %llu has no finite position",
+                               (unsigned long long)particles->id[i]);
+            bounds.min[k] = fminf(bounds.min[k], x);
+            bounds.max[k] = fmaxf(bounds.max[k], x);
+        }
+    return grid_layout(&cloud->cells, &bounds, sim->kernel.support, 1) ||
+           err_set(err, ERR_DIVERGED, "the particles spread over more than %d cells of %g m", GRID_MAX_CELLS,
+                   (double)sim->kernel.support);
+}
+
+static void cloud_sort(const SkiffSim *sim, const float *unknown, PressureCloud *cloud, size_t cells) {
+    const Particles *particles = &sim->particles;
+    uint32_t *start = cloud->start;
+    for (uint32_t i = 0; i < particles->count; i++)
+        start[grid_cell_of(&cloud->cells, particles->position[i]) + 1]++;
+    for (size_t c = 0; c < cells; c++)
+        start[c + 1] += start[c];
+    for (uint32_t i = 0; i < particles->count; i++) {
+        const float *x = particles->position[i];
+        const uint32_t to = start[grid_cell_of(&cloud->cells, x)]++;
+        cloud->order[to] = i;
+        memcpy(cloud->points[to], (float[]){x[0], x[1], x[2], unknown[i]}, sizeof(Float4));
+    }
+    memmove(start + 1, start, cells * sizeof *start);
+    start[0] = 0;
+}
+
+static bool cloud_make(const SkiffSim *sim, const float *unknown, PressureCloud *cloud, Err *err) {
+    *cloud = (PressureCloud){0};
+    if (!cloud_layout(sim, cloud, err))
+        return false;
+    const int32_t *size = cloud->cells.size;
+    const size_t cells = (size_t)size[0] * (size_t)size[1] * (size_t)size[2], count = sim->particles.count;
+    cloud->start = calloc(cells + 1, sizeof *cloud->start);
+    cloud->order = malloc(count * sizeof *cloud->order);
+    cloud->points = malloc(count * sizeof *cloud->points);
+    if (cloud->start == NULL || cloud->order == NULL || cloud->points == NULL) {
+        cloud_free(cloud);
+        return err_set(err, ERR_INPUT, "no memory for the pressures of %u particles", sim->particles.count);
+    }
+    cloud_sort(sim, unknown, cloud, cells);
+    return true;
+}
+
+/* sum_j P_j W_ij, Pa/m^3. */
+static double cloud_sum(const PressureCloud *cloud, const Kernel *kernel, const float *p) {
+    const int32_t column = cloud->cells.size[1], slab = column * cloud->cells.size[2];
+    const int32_t cell = (int32_t)grid_cell_of(&cloud->cells, p);
+    const float support_sq = kernel->support * kernel->support;
+    double sum = 0.0;
+    for (int run = 0; run < 9; run++) {
+        const int32_t middle = cell + (run / 3 - 1) * slab + (run % 3 - 1) * column;
+        for (uint32_t j = cloud->start[middle - 1]; j < cloud->start[middle + 2]; j++) {
+            const float *q = cloud->points[j];
+            const float dx = p[0] - q[0], dy = p[1] - q[1], dz = p[2] - q[2];
+            const float distance_sq = dx * dx + dy * dy + dz * dz;
+            if (distance_sq < support_sq)
+                sum += (double)(q[3] * kernel_w(kernel, sqrtf(distance_sq)));
+        }
+    }
+    return sum;
+}
+
+bool skiff_pressure(const SkiffSim *sim, float *pressure, Err *err) {
+    const Particles *particles = &sim->particles;
+    if (particles->count == 0)
+        return true;
+    sim_add_pressures(sim, pressure);
+    PressureCloud cloud;
+    if (!cloud_make(sim, pressure, &cloud, err))
+        return false;
+#pragma omp parallel for schedule(dynamic, 256) num_threads(sim->threads)
+    for (uint32_t k = 0; k < particles->count; k++) {
+        const uint32_t i = cloud.order[k];
+        /* what stands at a window's edge has no unknown but the pressure of still water itself */
+        if (particles->edge[i] == EDGE_NONE)
+            pressure[i] = sim->volume * (float)cloud_sum(&cloud, &sim->kernel, cloud.points[k]);
+    }
+    cloud_free(&cloud);
+    return true;
+}
