@@ -152,7 +152,7 @@ static void counting_sort(Grid *grid, const Particles *particles, const GridBoun
 /* Orders by neighbours, by near ones, by place: all different. */
 static inline int32_t row_key(uint32_t row_size, uint32_t place) {
     static_assert(MAX_NEIGHBOURS < 512 && ROW_GROUP <= 8192, "three numbers in 31 bits");
-    return (int32_t)(((row_size >> 16) << 9 | (row_size & 0xffffu)) * ROW_GROUP + place);
+    return (int32_t)((row_all(row_size) << 9 | row_near(row_size)) * ROW_GROUP + place);
 }
 
 /* Fills order, and turns member from where the particles are to where they will be. A particle's rank in its

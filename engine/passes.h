@@ -110,6 +110,17 @@ typedef struct SliceRows {
  */
 #define NEAR_SUPPORT 0.68f
 
+/* A particle's fluid neighbours, in all and near ones, in one number: particles.inl's row_size. */
+static inline uint32_t row_size_of(uint32_t all, uint32_t near) {
+    return all << 16 | near;
+}
+static inline uint32_t row_all(uint32_t row_size) {
+    return row_size >> 16;
+}
+static inline uint32_t row_near(uint32_t row_size) {
+    return row_size & 0xffffu;
+}
+
 /* What every pair pass reads. Arrays are padded to whole blocks. */
 typedef struct PairData {
     uint32_t count;

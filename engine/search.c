@@ -145,7 +145,7 @@ static bool pack_slice(const SearchJob *job, uint32_t first, const SliceRows *ro
     for (uint32_t l = 0; l < SLICE; l++) {
         const bool real = first + l < job->count;
         lists[l] = scratch->lists + (real ? scratch->list_start[(first + l) % ROW_GROUP] : 0);
-        counts[l] = real ? (int32_t)(job->row_size[first + l] >> 16) : 0;
+        counts[l] = real ? (int32_t)row_all(job->row_size[first + l]) : 0;
     }
     /* copies, as what is stored here could be anything, for all the compiler knows */
     const Kernel kernel = job->kernel;
@@ -220,7 +220,7 @@ static bool list_group(const SearchJob *job, uint32_t begin, SearchCell *cell, S
         used += (uint32_t)found.all + LANES;
         far_used += (uint32_t)(found.all - found.near);
         job->neighbours[i] = (uint16_t)found.all;
-        job->row_size[i] = (uint32_t)found.all << 16 | (uint32_t)found.near;
+        job->row_size[i] = row_size_of((uint32_t)found.all, (uint32_t)found.near);
     }
     return true;
 }
@@ -229,7 +229,7 @@ static bool list_group(const SearchJob *job, uint32_t begin, SearchCell *cell, S
  * writing what this reads. */
 static void join_group(const SearchJob *job, uint32_t begin, Scratch *scratch) {
     for (uint32_t i = begin; i < begin + ROW_GROUP && i < job->count; i++) {
-        const int near = (int)(job->row_size[i] & 0xffffu), count = (int)(job->row_size[i] >> 16) - near;
+        const int near = (int)row_near(job->row_size[i]), count = (int)row_all(job->row_size[i]) - near;
         const int32_t *from = scratch->far + scratch->far_start[i % ROW_GROUP];
         int32_t *to = scratch->lists + scratch->list_start[i % ROW_GROUP] + near;
         for (int k = 0; k < count; k += LANES)
@@ -241,7 +241,7 @@ static void join_group(const SearchJob *job, uint32_t begin, Scratch *scratch) {
 static SliceRows slice_extent(const SearchJob *job, uint32_t first) {
     SliceRows rows = {0};
     for (uint32_t i = first; i < first + SLICE && i < job->count; i++) {
-        const uint16_t all = (uint16_t)(job->row_size[i] >> 16), near = (uint16_t)job->row_size[i];
+        const uint16_t all = (uint16_t)row_all(job->row_size[i]), near = (uint16_t)row_near(job->row_size[i]);
         rows.length = all > rows.length ? all : rows.length;
         rows.near = near > rows.near ? near : rows.near;
     }

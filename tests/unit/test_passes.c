@@ -352,7 +352,7 @@ static void test_sort(void **state) {
                 p[k] = (float)random_unit(&seed);
             particles_append(&particles, p, (const float[3]){0}, 0.0);
             particles.row_size[i] =
-                (uint32_t)(30 + 8 * random_unit(&seed)) << 16 | (uint32_t)(10 + 4 * random_unit(&seed));
+                row_size_of((uint32_t)(30 + 8 * random_unit(&seed)), (uint32_t)(10 + 4 * random_unit(&seed)));
         }
         const GridBounds domain = {{0, 0, 0}, {1, 0.9f, 1}};
         uint32_t removed = 0;
