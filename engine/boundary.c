@@ -145,8 +145,8 @@ bool boundary_add(BoundarySet *set, const SurfaceDef *surface, Err *err) {
 
 static bool set_reserve(BoundarySet *set, size_t cells, Err *err) {
     const size_t padded = set->samples.count + SLICE;
-    /* x, y, z, volume, object, origin of the sorted samples, then their world positions */
-    if (!buffer_reserve(&set->buffer, "boundary samples", padded * (6 * sizeof(float) + sizeof(Float4)), err))
+    /* world positions and cells of the samples; x, y, z, volume, object, origin of the sorted ones */
+    if (!buffer_reserve(&set->buffer, "boundary samples", padded * (7 * sizeof(float) + sizeof(Float4)), err))
         return false;
     if (set->cells.size < (cells + 1) * sizeof(uint32_t) &&
         !buffer_reserve(&set->cells, "boundary cells", (cells + cells / 3 + 1) * sizeof(uint32_t), err))
@@ -163,14 +163,14 @@ static bool set_reserve(BoundarySet *set, size_t cells, Err *err) {
     set->sorted.volume = x + 3 * padded;
     set->sorted.object = (int32_t *)(x + 4 * padded);
     set->origin = (uint32_t *)(x + 5 * padded);
+    set->cell = (uint32_t *)(x + 6 * padded);
     set->sorted.grid.start = set->cells.data;
     set->sorted.occupied = set->occupied.data;
     return true;
 }
 
 static void mark_occupied(const CellGrid *grid, uint8_t *occupied) {
-    const size_t cells = (size_t)grid->size[0] * (size_t)grid->size[1] * (size_t)grid->size[2];
-    memset(occupied, 0, cells);
+    memset(occupied, 0, cell_grid_count(grid));
     for (int32_t x = 1; x + 1 < grid->size[0]; x++)
         for (int32_t z = 1; z + 1 < grid->size[2]; z++)
             for (int32_t y = 1; y + 1 < grid->size[1]; y++) {
@@ -210,33 +210,24 @@ bool boundary_sort(BoundarySet *set, float cell_size, Err *err) {
         return err_set(err, ERR_DIVERGED, "the boundary samples spread over more than %d cells of %g m",
                        GRID_MAX_CELLS, (double)cell_size);
     const CellGrid *grid = &set->sorted.grid;
-    const size_t cells = (size_t)grid->size[0] * (size_t)grid->size[1] * (size_t)grid->size[2];
+    const size_t cells = cell_grid_count(grid);
     if (!set_reserve(set, cells, err))
         return false;
-    uint32_t *start = set->cells.data;
-    memset(start, 0, (cells + 1) * sizeof(uint32_t));
     for (uint32_t s = 0; s < count; s++)
-        if (in_reach(set, s))
-            start[grid_cell_of(grid, set->world[s]) + 1]++;
-    for (size_t c = 0; c < cells; c++)
-        start[c + 1] += start[c];
+        set->cell[s] = in_reach(set, s) ? grid_cell_of(grid, set->world[s]) : CELL_NONE;
     /* samples come grouped by object, and a stable sort keeps them so within a cell */
+    cell_grid_sort(set->cell, count, cells, set->cells.data, set->origin);
     float *x = (float *)set->sorted.x, *y = (float *)set->sorted.y, *z = (float *)set->sorted.z;
     float *volume = (float *)set->sorted.volume;
     int32_t *object = (int32_t *)set->sorted.object;
-    for (uint32_t s = 0; s < count; s++) {
-        if (!in_reach(set, s))
-            continue;
-        const uint32_t to = start[grid_cell_of(grid, set->world[s])]++;
+    for (uint32_t to = 0; to < set->sorted.count; to++) {
+        const uint32_t s = set->origin[to];
         x[to] = set->world[s][0];
         y[to] = set->world[s][1];
         z[to] = set->world[s][2];
         volume[to] = set->world[s][3];
         object[to] = set->samples.object[s];
-        set->origin[to] = s;
     }
-    memmove(start + 1, start, cells * sizeof(uint32_t));
-    start[0] = 0;
     mark_occupied(grid, set->occupied.data);
     return true;
 }
@@ -246,15 +237,14 @@ bool boundary_sort(BoundarySet *set, float cell_size, Err *err) {
 static void sample_volumes(BoundarySet *set, const Kernel *kernel) {
     const SampleSet *sorted = &set->sorted;
     const CellGrid *grid = &sorted->grid;
-    const int32_t column = grid->size[1], slab = grid->size[1] * grid->size[2];
 #pragma omp parallel for schedule(dynamic, 256)
     for (uint32_t s = 0; s < set->samples.count; s++) {
         const float *p = set->world[s];
         const int32_t cell = (int32_t)grid_cell_of(grid, p);
         double sum = 0.0;
-        for (int run = 0; run < 9; run++) {
-            const int32_t middle = cell + (run / 3 - 1) * slab + (run % 3 - 1) * column;
-            for (uint32_t b = grid->start[middle - 1]; b < grid->start[middle + 2]; b++) {
+        for (int run = 0; run < CELL_RUNS; run++) {
+            const CellRun near = cell_grid_run(grid, cell, run);
+            for (uint32_t b = near.begin; b < near.end; b++) {
                 const float dx = p[0] - sorted->x[b], dy = p[1] - sorted->y[b], dz = p[2] - sorted->z[b];
                 sum += (double)kernel_w(kernel, sqrtf(dx * dx + dy * dy + dz * dz));
             }

@@ -24,8 +24,9 @@ typedef struct BoundarySet {
     bool has_reach;
     GridBounds reach; /* of the water, window-local: samples outside touch none and are not sorted */
     SampleSet sorted; /* in the window's frame, by cell */
-    uint32_t *origin; /* [count] which of `samples` a sorted one is */
+    uint32_t *origin; /* [sorted.count] which of `samples` a sorted one is */
     Float4 *world;    /* [count] window-local positions in the order of `samples`; [3]: volume */
+    uint32_t *cell;   /* [count] of these */
     Buffer buffer, cells, occupied;
 } BoundarySet;
 

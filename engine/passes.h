@@ -8,6 +8,7 @@
 #define SKIFF_PASSES_H
 
 #include "base/simd.h"
+#include "cell_grid.h"
 #include "kernel.h"
 
 #include <stdbool.h>
@@ -39,19 +40,6 @@ typedef struct RowEntryWide {
     int32_t place[SLICE];
     uint16_t factor[SLICE];
 } RowEntryWide;
-
-/* Cells of edge h over the particles' bounds with one empty layer around; y fastest, then z, then x: the
- * three cells of a column that a particle sees are one contiguous run of particles. */
-typedef struct CellGrid {
-    float origin[3];       /* m */
-    float inv_size;        /* 1/m */
-    int32_t size[3];       /* cells along x, y, z */
-    const uint32_t *start; /* [cells + 1] first particle of a cell */
-} CellGrid;
-
-static inline int32_t cell_grid_index(const CellGrid *grid, int32_t x, int32_t y, int32_t z) {
-    return (x * grid->size[2] + z) * grid->size[1] + y;
-}
 
 /* Terms of one particle against one wall or body, summed over its samples b of volume psi_b: g = sum psi_b
  * grad W_ib, t = sum psi_b (x_b - c) x grad W_ib with c the object's centre (origin for walls). They replace
