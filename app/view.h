@@ -1,4 +1,5 @@
-/* Pictures of a simulation: the one module that knows both the engine and the renderer. */
+/* Pictures of a simulation as it runs: which frames are due, and where they go. The files
+ * view*.c are all that know both the engine and the renderer. */
 #ifndef SKIFF_APP_VIEW_H
 #define SKIFF_APP_VIEW_H
 
