@@ -52,18 +52,26 @@ double reproduce_radius(const CliArgs *args) {
 Scene *reproduce_scene(const ReproduceJob *job, const char *name, double duration, const char *const *edits,
                        int edit_count, Err *err) {
     enum { OWN = 3, MAX = 8 };
-    static const double paper_step = 0.003; /* s */
     const double radius = reproduce_radius(job->args);
     char texts[OWN][64];
     const char *all[MAX] = {texts[0], texts[1], texts[2]};
     assert(OWN + edit_count <= MAX);
     snprintf(texts[0], sizeof texts[0], "particleRadius=%.9g", radius);
-    snprintf(texts[1], sizeof texts[1], "timeStepSize=%.9g", paper_step * radius / CARENSAC_RADIUS);
+    snprintf(texts[1], sizeof texts[1], "timeStepSize=%.9g", carensac_time_step(radius));
     snprintf(texts[2], sizeof texts[2], "duration=%.9g",
              isnan(job->args->duration) ? duration : job->args->duration);
     for (int k = 0; k < edit_count; k++)
         all[OWN + k] = edits[k];
     return carried_scene(name, all, OWN + edit_count, err);
+}
+
+void reproduce_keep_layer(const Scene *shipped, double radius,
+                          char edits[REPRODUCE_LAYER_EDITS][REPRODUCE_EDIT_SIZE]) {
+    const SkiffParams *params = &shipped->def.params;
+    const float outflow = params->outflow_distance * params->particle_radius;
+    const float inflow = params->inflow_layer * params->particle_radius;
+    snprintf(edits[0], REPRODUCE_EDIT_SIZE, "outflowDistance=%.9g", (double)outflow / radius);
+    snprintf(edits[1], REPRODUCE_EDIT_SIZE, "inflowLayer=%.9g", (double)inflow / radius);
 }
 
 void reproduce_tell(const ReproduceJob *job, const char *row, const SkiffSim *sim, double end) {

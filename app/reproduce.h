@@ -24,6 +24,11 @@ double reproduce_radius(const CliArgs *args);
  * or without it `duration` (s); then edited by `edits`. */
 Scene *reproduce_scene(const ReproduceJob *job, const char *name, double duration, const char *const *edits,
                        int edit_count, Err *err);
+/* Edits that leave the layer in which a scene absorbs as thick as it is there (m), whatever its particles'
+ * radius becomes (m). `shipped`: the scene without edits. */
+enum { REPRODUCE_LAYER_EDITS = 2, REPRODUCE_EDIT_SIZE = 64 };
+void reproduce_keep_layer(const Scene *shipped, double radius,
+                          char edits[REPRODUCE_LAYER_EDITS][REPRODUCE_EDIT_SIZE]);
 /* A line of progress on stderr, twenty times on the way to `end` (s). */
 void reproduce_tell(const ReproduceJob *job, const char *row, const SkiffSim *sim, double end);
 

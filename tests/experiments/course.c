@@ -3,6 +3,7 @@
  * --radius 0.025. */
 #include "experiment.h"
 
+#include "app/carensac.h"
 #include "app/pilot.h"
 
 static const char *const scene_file = SKIFF_SOURCE_DIR "/assets/scenes/boat-cylinder-5m.json";
@@ -26,7 +27,7 @@ static Course begin(const Experiment *experiment, const char *input) {
     char texts[2][64], path[4096];
     const char *edits[2] = {texts[0], texts[1]};
     snprintf(texts[0], sizeof texts[0], "particleRadius=%.9g", experiment->radius);
-    snprintf(texts[1], sizeof texts[1], "timeStepSize=%.9g", 0.003 * experiment->radius / 0.025);
+    snprintf(texts[1], sizeof texts[1], "timeStepSize=%.9g", carensac_time_step(experiment->radius));
     snprintf(path, sizeof path, SKIFF_SOURCE_DIR "/assets/inputs/%s.input", input);
     course.scene = scene_load(scene_file, edits, 2, &err);
     experiment_need(course.scene && pilot_read(&course.pilot, course.scene, path, NULL, &err), &err);

@@ -3,6 +3,8 @@
  * back from the walls of the tank (shallow water: sqrt(g h), to the side and back about 3.6 s). */
 #include "experiment.h"
 
+#include "app/carensac.h"
+
 enum { CELLS = 15, HALF = CELLS / 2 }; /* cells of the map of the surface, to a side */
 
 static const double radius_default = 0.06, level = 0.9, window_radius = 2.5; /* m */
@@ -22,7 +24,7 @@ static SkiffSim *make(const Experiment *experiment, bool window) {
     const double r = experiment->radius;
     def.threads = experiment->threads;
     def.params.particle_radius = (float)r;
-    def.params.time_step = (float)(0.003 * r / 0.025);
+    def.params.time_step = (float)carensac_time_step(r);
     def.params.boundary_offset = 1.15f;
     def.params.escape = 1;
     def.tank.geometry.kind = SKIFF_GEOMETRY_CYLINDER;

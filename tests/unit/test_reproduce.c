@@ -2,6 +2,7 @@
  * them. */
 #include "app/carensac.h"
 #include "app/carried.h"
+#include "app/reproduce.h"
 #include "app/series.h"
 #include "app/svg.h"
 #include "engine/base/file.h"
@@ -274,6 +275,11 @@ static void the_wedge_parts_the_corridor(void **state) {
     assert_true(wedge->density == 800 && wedge->stop_time == 0.72);
     assert_float_equal(shape_volume(&scene->def.tank.geometry, min, max), 50, 1e-3);
     assert_true(scene->def.sea.has_region && scene->def.sea.region_min[2] == 4.5f);
+    /* half a metre of the end absorbs, with particles of any size */
+    char edits[REPRODUCE_LAYER_EDITS][REPRODUCE_EDIT_SIZE];
+    reproduce_keep_layer(scene, 0.05, edits);
+    assert_string_equal(edits[0], "outflowDistance=10");
+    assert_string_equal(edits[1], "inflowLayer=10");
     scene_free(scene);
 }
 
