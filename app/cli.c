@@ -100,7 +100,7 @@ typedef struct Command {
          OPTION_INTEGER,                                                                                     \
          PICTURE(supersample),                                                                               \
          .min = 1,                                                                                           \
-         .max = 4,                                                                                           \
+         .max = RENDER_SUPERSAMPLE_MAX,                                                                      \
          .help = "Draw N times larger, then average; for stills"},                                           \
         {0,                                                                                                  \
          "look",                                                                                             \

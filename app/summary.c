@@ -48,7 +48,9 @@ json_t *summary_figure(double value) {
     return json_text_double(strtod(text, NULL));
 }
 
-json_t *summary_statistics(double *values, size_t count) {
+/* {"mean":, "p50":, "p95":, "p99":, "max":} of count values, whose order is lost. Percentiles by nearest
+ * rank. New reference. */
+static json_t *statistics(double *values, size_t count) {
     if (count == 0)
         return json_null();
     double sum = 0;
@@ -75,7 +77,7 @@ uint32_t summary_sample_count(const SkiffSim *sim) {
 
 static void add_column(json_t *into, const char *key, const CsvTable *steps, const char *column) {
     double *values = csv_copy_column(steps, column);
-    json_object_set_new(into, key, values ? summary_statistics(values, steps->row_count) : json_null());
+    json_object_set_new(into, key, values ? statistics(values, steps->row_count) : json_null());
     free(values);
 }
 

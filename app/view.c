@@ -30,7 +30,6 @@ struct View {
     char output[PATH_SIZE];
     double start; /* s */
     Sequence draw, save;
-    int drawn;
 
     Picture *picture; /* NULL: nothing is drawn */
     uint8_t *rgb;     /* the frame that is drawn, or was before an interruption */
@@ -68,7 +67,6 @@ static bool draw(View *view, const Frame *frame, int number, double step_ms, Err
         return true;
     if (!view_picture_draw(view->picture, frame, step_ms, view->rgb, err))
         return false;
-    view->drawn++;
     return gfx_writer_add(view->writer, frame_path(view->output, "frames", number, "png", sizeof path, path),
                           view->video, view->rgb, err);
 }
@@ -223,10 +221,6 @@ bool view_step(View *view, const SkiffSim *sim, const ViewControls *controls, Er
 
 bool view_saved(View *view, const Frame *frame, int number, Err *err) {
     return draw(view, frame, number, NAN, err);
-}
-
-int view_frame_count(const View *view) {
-    return view->drawn;
 }
 
 bool view_finish(View *view, Err *err) {

@@ -43,7 +43,4 @@ bool view_finish(View *view, Err *err);
 /* Without view_finish the film is thrown away; frames are complete in any case. NULL is fine. */
 void view_destroy(View *view);
 
-/* Frames drawn so far, for a last message. */
-int view_frame_count(const View *view);
-
 #endif

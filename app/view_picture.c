@@ -15,6 +15,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Scenes and options allow what the renderer does. */
+_Static_assert((int)RENDER_SIZE_MIN == (int)GFX_SIZE_MIN && (int)RENDER_SIZE_MAX == (int)GFX_SIZE_MAX &&
+                   (int)RENDER_SUPERSAMPLE_MAX == (int)GFX_SUPERSAMPLE_MAX,
+               "limits of scene_table.h");
+
 struct Picture {
     const SceneRender *render;
     double start; /* s */
@@ -200,16 +205,13 @@ bool view_picture_load(Picture *picture, double time, const char *path, Err *err
 /* ---- Life ---- */
 
 static bool make_gfx(Picture *picture, const ViewOptions *options, Err *err) {
-    static const GfxBackend backends[] = {GFX_BACKEND_AUTO, GFX_BACKEND_EGL_DEVICE,
-                                          GFX_BACKEND_EGL_SURFACELESS, GFX_BACKEND_OSMESA};
-    static const GfxLook looks[] = {GFX_LOOK_WATER, GFX_LOOK_PARTICLES};
     const SceneRender *render = picture->render;
     GfxDef def = gfx_def_default();
     def.width = render->width;
     def.height = render->height;
     def.supersample = render->supersample;
-    def.look = looks[render->look];
-    def.backend = backends[options->backend];
+    def.look = (GfxLook)render->look;
+    def.backend = (GfxBackend)options->backend;
     picture->gfx = gfx_create(&def, err);
     if (!picture->gfx)
         return false;

@@ -190,7 +190,8 @@ static bool in_reach(const BoundarySet *set, uint32_t s) {
     return true;
 }
 
-bool boundary_sort(BoundarySet *set, float cell_size, Err *err) {
+/* Sorts a set's world positions into cells of edge h. */
+static bool sort_set(BoundarySet *set, float cell_size, Err *err) {
     const uint32_t count = set->samples.count;
     GridBounds bounds = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
     set->sorted.count = 0;
@@ -260,12 +261,12 @@ bool boundary_weigh(BoundarySet *set, const Kernel *kernel, Err *err) {
         return false;
     for (uint32_t s = 0; s < set->samples.count; s++)
         memcpy(set->world[s], set->samples.position[s], sizeof set->samples.position[s]);
-    if (!boundary_sort(set, kernel->support, err))
+    if (!sort_set(set, kernel->support, err))
         return false;
     sample_volumes(set, kernel);
     for (uint32_t s = 0; s < set->samples.count; s++)
         set->world[s][3] = set->samples.volume[s];
-    return boundary_sort(set, kernel->support, err); /* once more: the sorted copy takes the volumes along */
+    return sort_set(set, kernel->support, err); /* once more: the sorted copy takes the volumes along */
 }
 
 bool boundary_append(BoundarySet *set, const BoundarySamples *more, Err *err) {
@@ -331,7 +332,7 @@ bool boundary_place(Boundary *boundary, const Body *bodies, int body_count, cons
             set->world[s][k] = (float)(world[k] + (body->position[k] - origin[k]));
         set->world[s][3] = set->samples.volume[s];
     }
-    return boundary_sort(set, cell_size, err);
+    return sort_set(set, cell_size, err);
 }
 
 /* One try: contacts of every block, appended to the common list. False: a particle touches too many objects

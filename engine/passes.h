@@ -136,10 +136,9 @@ static inline uint32_t entry_neighbour(const PairData *pairs, uint32_t first, ui
 
 typedef enum SearchStatus {
     SEARCH_OK = 0,
-    SEARCH_NEEDS_WIDE = 1,   /* an index offset does not fit RowEntry */
-    SEARCH_TOO_DENSE = 2,    /* more than MAX_NEIGHBOURS or MAX_CANDIDATES */
-    SEARCH_NEEDS_MEMORY = 4, /* the row pool is too small */
-    SEARCH_TOO_MANY_OBJECTS = 8
+    SEARCH_NEEDS_WIDE = 1,  /* an index offset does not fit RowEntry */
+    SEARCH_TOO_DENSE = 2,   /* more than MAX_NEIGHBOURS or MAX_CANDIDATES */
+    SEARCH_NEEDS_MEMORY = 4 /* the row pool is too small */
 } SearchStatus;
 
 /* Takes room for `entries` row entries; returns the first or UINT32_MAX when the pool is used up. Called by

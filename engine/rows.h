@@ -48,6 +48,5 @@ bool rows_reserve_correction(Rows *rows, const Particles *particles, Err *err);
 void rows_correct(Rows *rows, const Passes *passes, int threads);
 void rows_free(Rows *rows);
 Scratch *rows_scratch(Rows *rows, int thread);
-size_t rows_entry_size(bool wide);
 
 #endif

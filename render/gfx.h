@@ -46,8 +46,6 @@ typedef enum GfxBackend {
 
 /* "auto", "egl-device", "egl", "osmesa": the words of `--gl`. */
 const char *gfx_backend_name(GfxBackend backend);
-/* False with ERR_USAGE and the list of words. */
-bool gfx_backend_parse(const char *name, GfxBackend *backend, Err *err);
 
 typedef enum GfxLook {
     GFX_LOOK_WATER,     /* a water surface with foam and spray, in an endless ocean where there is one */
@@ -57,7 +55,6 @@ typedef enum GfxLook {
 
 /* "water", "particles". */
 const char *gfx_look_name(GfxLook look);
-bool gfx_look_parse(const char *name, GfxLook *look, Err *err);
 
 enum { GFX_SIZE_MIN = 16, GFX_SIZE_MAX = 8192, GFX_SUPERSAMPLE_MAX = 4 };
 
