@@ -192,6 +192,8 @@ static json_t *make_result(const Bench *bench) {
 
 /* ---- Results ---- */
 
+enum { LABEL_WIDTH = 54 };
+
 static double number(const json_t *result, const char *key) {
     return json_number_value(json_object_get(result, key));
 }
@@ -201,7 +203,7 @@ static const char *text(const json_t *result, const char *key) {
 }
 
 static void print_row(const char *label, double value, const char *unit) {
-    printf("  %-44s %10.4g %s\n", label, value, unit);
+    printf("  %-*s %10.4g %s\n", LABEL_WIDTH, label, value, unit);
 }
 
 static void print_table(const Bench *bench, const json_t *result) {
@@ -211,12 +213,12 @@ static void print_table(const Bench *bench, const json_t *result) {
            text(result, "cpu"), number(result, "threads"), text(result, "isa"), text(result, "commit"));
     printf("%d windows of %d steps after %g s; medians\n\n", bench->args->windows, bench->args->steps,
            bench->args->settle);
-    printf("  %-44s %10s %6s\n", "phase", "ms", "%");
+    printf("  %-*s %10s %6s\n", LABEL_WIDTH, "phase", "ms", "%");
     for (int i = 0; i < SKIFF_PHASE_COUNT; i++) {
         double ms = median(bench, phase_figure, i, NULL, NULL);
-        printf("  %-44s %10.2f %6.1f\n", skiff_phase_label(i), ms, 100 * ms / step_ms);
+        printf("  %-*s %10.2f %6.1f\n", LABEL_WIDTH, skiff_phase_label(i), ms, 100 * ms / step_ms);
     }
-    printf("  %-44s %10.2f %6.1f   (windows: %.2f to %.2f)\n\n", "step", step_ms, 100.0,
+    printf("  %-*s %10.2f %6.1f   (windows: %.2f to %.2f)\n\n", LABEL_WIDTH, "step", step_ms, 100.0,
            number(result, "ms_min"), number(result, "ms_max"));
     print_row("search, sort and boundary terms", number(result, "search_ms"), "ms");
     print_row("one solver iteration", number(result, "iteration_ms"), "ms");
@@ -227,9 +229,9 @@ static void print_table(const Bench *bench, const json_t *result) {
     print_row("divergence error, mean", number(result, "divergence_error_percent"), "%");
     print_row("neighbours, mean", number(result, "neighbours"), "");
     print_row("peak memory", number(result, "peak_rss_mb"), "MB");
-    printf("  %-44s %10.0f\n", "particles a second", number(result, "particles_per_s"));
+    printf("  %-*s %10.0f\n", LABEL_WIDTH, "particles a second", number(result, "particles_per_s"));
     print_row("real-time factor (1 is real time)", number(result, "real_time_factor"), "");
-    printf("  %-44s %s\n", "state hash", text(result, "state_hash"));
+    printf("  %-*s %s\n", LABEL_WIDTH, "state hash", text(result, "state_hash"));
 }
 
 /* tests/bench/results of the tree whose assets/scenes the scene is in; false when there is no such folder. */

@@ -430,8 +430,9 @@ static void print_main_help(void) {
 }
 
 static void print_command_help(const Command *command) {
-    printf("skiff %s: %s\n\nUsage: skiff %s %s [OPTION]...\n\n%s\nOptions:\n", command->name,
-           command->summary, command->name, command->arguments, command->details);
+    printf("skiff %s: %s\n\nUsage: skiff %s%s%s [OPTION]...\n\n%s\nOptions:\n", command->name,
+           command->summary, command->name, *command->arguments ? " " : "", command->arguments,
+           command->details);
     for (int i = 0; i < command->option_count; i++) {
         const Option *option = &command->options[i];
         char letter[8] = "    ", usage[64];

@@ -156,8 +156,9 @@ extern const ObjectType scene_file_type;
 
 /* What an empty section "Render" means. */
 SceneRender scene_render_default(void);
-/* Names of all cameras, "a|b|c": those of `render` (NULL: none), then those that always exist,
- * RENDER_CAMERAS. Returns the length; writes nothing where out is NULL, else size is at least the length + 1.
+/* Names of all cameras, "a|b|c": those of `render` (NULL: none), then those of
+ * RENDER_CAMERAS, which always exist, unless one of these has its name. Returns the length; writes nothing
+ * where out is NULL, else size is at least the length + 1.
  */
 size_t scene_camera_names(const SceneRender *render, char *out, size_t size);
 /* A camera of which nothing is said. */

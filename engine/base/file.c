@@ -84,7 +84,7 @@ bool file_begin(FileWriter *writer, const char *path, Err *err) {
     memcpy(writer->temporary + length, ".tmp", sizeof ".tmp");
     writer->stream = fopen(writer->temporary, "wbe");
     if (!writer->stream)
-        return err_set(err, ERR_IO, "%s: cannot write: %s", writer->temporary, strerror(errno));
+        return err_set(err, ERR_IO, "%s: cannot write: %s", path, strerror(errno));
     return true;
 }
 
