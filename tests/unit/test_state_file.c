@@ -14,12 +14,13 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
+#include "scratch.h"
+
 enum { VERSION = 7, HEADER_SIZE = 24, ENTRY_SIZE = 80 };
 /* Where things lie in the file. */
 enum { AT_VERSION = 8, AT_COUNT = 12, AT_HASH = 16 };
 enum { IN_TYPE = 48, IN_COMPONENTS = 52, IN_ELEMENTS = 56, IN_OFFSET = 64, IN_HASH = 72 };
 
-static char folder[] = "/tmp/skiff-test-state-XXXXXX";
 static char path[128];
 
 static const float positions[5][3] = {{1, 2, 3}, {4, -5, 6}, {0.1f, -0.0f, 1e30f}, {7, 8, 9}, {1e-40f, 1, 2}};
@@ -51,17 +52,10 @@ static unsigned char *sample_bytes(size_t *size) {
 }
 
 static int setup(void **state) {
-    (void)state;
-    if (!mkdtemp(folder))
+    if (scratch_enter(state) != 0)
         return -1;
-    snprintf(path, sizeof path, "%s/sample.state", folder);
+    snprintf(path, sizeof path, "%s/sample.state", scratch_folder);
     return 0;
-}
-
-static int teardown(void **state) {
-    (void)state;
-    unlink(path);
-    return rmdir(folder);
 }
 
 static void put32(unsigned char *bytes, size_t at, uint32_t value) {
@@ -375,7 +369,7 @@ static void open_reports_files_that_are_not_there(void **state) {
     assert_null(state_file_open("/no/such/file.state", VERSION, &err));
     assert_int_equal(err.code, ERR_INPUT);
     assert_non_null(strstr(err.message, "/no/such/file.state"));
-    assert_null(state_file_open(folder, VERSION, &err));
+    assert_null(state_file_open(scratch_folder, VERSION, &err));
     assert_int_equal(err.code, ERR_INPUT);
 }
 
@@ -509,5 +503,5 @@ int main(void) {
         cmocka_unit_test(open_reports_files_that_are_not_there),
         cmocka_unit_test(hostile_bytes_do_no_harm),
     };
-    return cmocka_run_group_tests_name("state file", tests, setup, teardown);
+    return cmocka_run_group_tests_name("state file", tests, setup, scratch_leave);
 }
