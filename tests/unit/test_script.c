@@ -13,6 +13,7 @@
 #include <cmocka.h>
 
 #include "engine/base/file.h"
+#include "engine/base/random.h"
 
 #define COUNT(table) ((int)(sizeof(table) / sizeof *(table)))
 
@@ -238,9 +239,7 @@ static void scenes_bind_other_keys(void **state) {
 
 /* Counter-based, so that a failing case can be found again. */
 static uint32_t mix(uint64_t n) {
-    n = (n ^ (n >> 30)) * 0xbf58476d1ce4e5b9u;
-    n = (n ^ (n >> 27)) * 0x94d049bb133111ebu;
-    return (uint32_t)(n >> 32);
+    return (uint32_t)(random_bits(0, n) >> 32);
 }
 
 /* A random but valid file: all commands, many at the same time. */

@@ -1,5 +1,6 @@
 /* The container of arrays: what goes in comes out, and any damage is found and named. */
 #include "base/file.h"
+#include "base/random.h"
 #include "base/state_file.h"
 
 #include <setjmp.h>
@@ -376,13 +377,10 @@ static void open_reports_files_that_are_not_there(void **state) {
 /* ---- Fuzz: several mutations at once, with the checksums made right again so that they reach the deeper
  * checks ---- */
 
-static uint64_t random_state;
+static uint64_t random_stream, random_counter;
 
 static uint64_t next_random(void) {
-    uint64_t z = random_state += 0x9e3779b97f4a7c15u;
-    z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ z >> 27) * 0x94d049bb133111ebu;
-    return z ^ z >> 31;
+    return random_bits(random_stream, random_counter++);
 }
 
 /* Numbers at which sizes overflow or just fit. */
@@ -454,7 +452,8 @@ static void hostile_bytes_do_no_harm(void **state) {
     int accepted = 0;
     uint64_t sum = 0;
     for (uint64_t round = 0; round < 20000; round++) {
-        random_state = round * 0x5851f42d4c957f2du;
+        random_stream = round;
+        random_counter = 0;
         size_t length =
             next_random() % 8 == 0 ? HEADER_SIZE + next_random() % (size + 64 - HEADER_SIZE) : size;
         memset(bad, 0, size + 64);
