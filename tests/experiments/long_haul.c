@@ -35,7 +35,7 @@ static SkiffSim *make(const Experiment *experiment, int threads, double start) {
     def.params.particle_radius = (float)r;
     def.params.time_step = (float)carensac_time_step(r);
     def.params.boundary_offset = 1.15f;
-    def.params.escape = 1;
+    def.params.escape = SKIFF_ESCAPE_REMOVE;
     def.tank.geometry.kind = SKIFF_GEOMETRY_CYLINDER;
     def.tank.geometry.radius = 6.0f;
     def.tank.geometry.height = 5.0f;

@@ -26,7 +26,7 @@ static SkiffSim *make(const Experiment *experiment, bool window) {
     def.params.particle_radius = (float)r;
     def.params.time_step = (float)carensac_time_step(r);
     def.params.boundary_offset = 1.15f;
-    def.params.escape = 1;
+    def.params.escape = SKIFF_ESCAPE_REMOVE;
     def.tank.geometry.kind = SKIFF_GEOMETRY_CYLINDER;
     def.tank.geometry.radius = (float)((window ? 1.0 : 2.0) * window_radius);
     def.tank.geometry.height = 3.0f;
