@@ -131,8 +131,7 @@ static bool check_camera(const Cameras *cameras, const char *name, Err *err) {
 }
 
 bool view_cameras_make(Cameras *cameras, const Subject *subject, Err *err) {
-    static const char *const kinds[] = {"chase", "fixed", "orbit", "top", "bow"};
-    enum { KINDS = sizeof kinds / sizeof *kinds };
+    enum { KINDS = GFX_CAMERA_KIND_COUNT };
     const SceneRender *render = &subject->options->render;
     const SceneCamera *given = render->cameras.items;
     int count = render->cameras.count;
@@ -148,12 +147,16 @@ bool view_cameras_make(Cameras *cameras, const Subject *subject, Err *err) {
         if (!add_camera(cameras, subject, &given[i], i, err))
             return false;
     }
+    const char *kind = gfx_camera_kinds;
     for (int i = 0; i < KINDS; i++) {
         SceneCamera camera;
+        const int width = (int)strcspn(kind, "|");
         scene_camera_default(&camera);
-        camera.name = kinds[i];
+        snprintf(cameras->kinds[i], sizeof cameras->kinds[i], "%.*s", width, kind);
+        kind += width + (kind[width] == '|');
+        camera.name = cameras->kinds[i];
         camera.type = i;
-        if (find_camera(cameras, kinds[i]) < 0 && !add_camera(cameras, subject, &camera, count + i, err))
+        if (find_camera(cameras, camera.name) < 0 && !add_camera(cameras, subject, &camera, count + i, err))
             return false;
     }
     const char *first = render->camera               ? render->camera

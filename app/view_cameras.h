@@ -15,7 +15,8 @@ typedef struct Camera {
 /* Zero-initialise, view_cameras_make, view_cameras_free. */
 typedef struct Cameras {
     Camera *items;
-    GfxCameraState *states; /* of the items */
+    GfxCameraState *states;               /* of the items */
+    char kinds[GFX_CAMERA_KIND_COUNT][8]; /* names of those that always exist */
     int count, current;
     bool stays; /* cuts are not followed */
 } Cameras;

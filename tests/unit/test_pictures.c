@@ -83,6 +83,7 @@ static void words_are_the_renderers(void **unused) {
         snprintf(list + strlen(list), sizeof list - strlen(list), "%s%s", i > 0 ? "|" : "",
                  gfx_look_name((GfxLook)i));
     assert_string_equal(list, RENDER_LOOKS);
+    assert_string_equal(gfx_camera_kinds, RENDER_CAMERAS);
 }
 
 static void wrong_options_are_explained(void **unused) {
