@@ -12,6 +12,7 @@
 #include "reproduce.h"
 #include "svg.h"
 
+#include "engine/base/angle.h"
 #include "engine/base/file.h"
 
 #include <assert.h>
@@ -227,7 +228,7 @@ static bool add_sample(Reproduction *run, int row, const SkiffSim *sim, double s
     const SkiffBody body = skiff_body(sim, 0);
     const double *q = body.rotation, sine = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]);
     /* The rotation vector; small angles about x and z are roll, about the submerged edge, and pitch. */
-    const double factor = sine > 0 ? 2 * atan2(sine, q[3]) / sine * 180 / 3.14159265358979323846 : 0;
+    const double factor = sine > 0 ? 2 * atan2(sine, q[3]) / sine * 180 / pi : 0;
     const double values[4] = {skiff_time(sim),
                               (body.position[1] - start_height) / (double)skiff_params(sim)->particle_radius,
                               factor * q[0], factor * q[2]};

@@ -36,6 +36,8 @@ void reproduce_tell(const ReproduceJob *job, const char *row, const SkiffSim *si
 bool reproduce_wedge(const ReproduceJob *job, Series *series, Err *err);
 void reproduce_wedge_charts(FILE *out, const Series *series);
 
+/* Degrees by which the bow, on the body's -x side, stands higher than at the start. */
+double reproduce_bow_up(const SkiffBody *boat);
 /* boat [Carensac2023 sec. 5.7]: a series for each row of the sheet. */
 bool reproduce_boat(const ReproduceJob *job, Series series[REPRODUCE_BOAT_WINDOWS], Err *err);
 void reproduce_boat_charts(FILE *out, const Sheet *sheet, const Series series[REPRODUCE_BOAT_WINDOWS]);

@@ -8,26 +8,24 @@
 #include <omp.h>
 #include <stdlib.h>
 
+/* Of BoundarySamples. */
+#define EACH_SAMPLE_ARRAY(DO) DO(position) DO(volume) DO(area) DO(normal) DO(surface) DO(object)
+
 static bool samples_grow(BoundarySamples *samples, uint32_t extra) {
     const uint32_t need = samples->count + extra;
     if (need <= samples->capacity)
         return true;
-    void *position = realloc(samples->position, need * sizeof *samples->position);
-    samples->position = position ? position : samples->position;
-    void *volume = realloc(samples->volume, need * sizeof *samples->volume);
-    samples->volume = volume ? volume : samples->volume;
-    void *area = realloc(samples->area, need * sizeof *samples->area);
-    samples->area = area ? area : samples->area;
-    void *normal = realloc(samples->normal, need * sizeof *samples->normal);
-    samples->normal = normal ? normal : samples->normal;
-    void *surface = realloc(samples->surface, need * sizeof *samples->surface);
-    samples->surface = surface ? surface : samples->surface;
-    void *object = realloc(samples->object, need * sizeof *samples->object);
-    samples->object = object ? object : samples->object;
-    if (!position || !volume || !area || !normal || !surface || !object)
-        return false;
-    samples->capacity = need;
-    return true;
+    bool good = true;
+#define GROW(field)                                                                                          \
+    {                                                                                                        \
+        void *grown = realloc(samples->field, need * sizeof *samples->field);                                \
+        samples->field = grown ? grown : samples->field;                                                     \
+        good = good && grown;                                                                                \
+    }
+    EACH_SAMPLE_ARRAY(GROW)
+#undef GROW
+    samples->capacity = good ? need : samples->capacity;
+    return good;
 }
 
 /* Displacements that move every face of the mesh by one unit along its normal: a vertex between faces goes
@@ -274,12 +272,9 @@ bool boundary_append(BoundarySet *set, const BoundarySamples *more, Err *err) {
     if (!samples_grow(samples, more->count))
         return err_add(err, ERR_INPUT, "no memory for %u boundary samples", more->count);
     const uint32_t to = samples->count;
-    memcpy(samples->position + to, more->position, more->count * sizeof *more->position);
-    memcpy(samples->volume + to, more->volume, more->count * sizeof *more->volume);
-    memcpy(samples->area + to, more->area, more->count * sizeof *more->area);
-    memcpy(samples->normal + to, more->normal, more->count * sizeof *more->normal);
-    memcpy(samples->surface + to, more->surface, more->count * sizeof *more->surface);
-    memcpy(samples->object + to, more->object, more->count * sizeof *more->object);
+#define COPY(field) memcpy(samples->field + to, more->field, more->count * sizeof *more->field);
+    EACH_SAMPLE_ARRAY(COPY)
+#undef COPY
     samples->count += more->count;
     return true;
 }
@@ -432,12 +427,9 @@ void boundary_impulse(const Boundary *boundary, const float *p, size_t stride, u
 }
 
 void boundary_set_free(BoundarySet *set) {
-    free(set->samples.position);
-    free(set->samples.volume);
-    free(set->samples.area);
-    free(set->samples.normal);
-    free(set->samples.surface);
-    free(set->samples.object);
+#define FREE(field) free(set->samples.field);
+    EACH_SAMPLE_ARRAY(FREE)
+#undef FREE
     buffer_free(&set->buffer);
     buffer_free(&set->cells);
     buffer_free(&set->occupied);

@@ -91,7 +91,7 @@ typedef enum GfxMaterialKind {
     GFX_MATERIAL_HULL, /* a boat's paint: antifouling, boot stripe, topsides in `color`, wooden deck, cabin */
     GFX_MATERIAL_STONE, /* quays, rocks, the sea's ground: `color` with grain and joints */
     GFX_MATERIAL_TANK,  /* a closed container seen from outside through its near walls: far walls and floor
-                           tiled in  `color`, edges as lines */
+                           tiled in `color`, edges as lines */
     GFX_MATERIAL_COUNT
 } GfxMaterialKind;
 

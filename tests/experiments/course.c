@@ -5,6 +5,7 @@
 
 #include "app/carensac.h"
 #include "app/pilot.h"
+#include "app/reproduce.h"
 
 static const char *const scene_file = SKIFF_SOURCE_DIR "/assets/scenes/boat-cylinder-5m.json";
 static const double radius_default = 0.1;
@@ -39,7 +40,7 @@ static Course begin(const Experiment *experiment, const char *input) {
 }
 
 static double degrees(double angle) {
-    return angle * 180.0 / EXPERIMENT_PI;
+    return angle * 180.0 / pi;
 }
 
 static void advance(Course *course) {
@@ -48,10 +49,9 @@ static void advance(Course *course) {
     experiment_step(course->sim);
     const SkiffStats *stats = skiff_stats(course->sim);
     const SkiffBody boat = skiff_body(course->sim, 0);
-    const double *q = boat.rotation, rise = -2.0 * (q[0] * q[1] + q[2] * q[3]);
     const double iterations = stats->density_iterations + stats->divergence_iterations;
     course->drive = skiff_drive(course->sim, 0);
-    course->bow_up = degrees(asin(fmax(-1.0, fmin(1.0, rise))));
+    course->bow_up = reproduce_bow_up(&boat);
     course->count = stats->particles;
     course->iterations += (iterations - course->iterations) / (double)stats->step;
     if (stats->step % 10 == 0)

@@ -4,6 +4,7 @@
 #include "experiment.h"
 
 #include "app/carensac.h"
+#include "app/reproduce.h"
 
 enum { CELLS = 15, HALF = CELLS / 2 }; /* cells of the map of the surface, to a side */
 
@@ -84,10 +85,9 @@ static Twin run(const Experiment *experiment, bool window) {
         }
     }
     const SkiffBody hull = skiff_body(sim, 0);
-    const double *q = hull.rotation;
     twin.drag /= steps;
     twin.rise = hull.position[1];
-    twin.trim = asin(-2.0 * (q[0] * q[1] + q[2] * q[3])) * 180.0 / EXPERIMENT_PI;
+    twin.trim = reproduce_bow_up(&hull);
     twin.count = skiff_particles(sim).count;
     for (int k = 0; k < CELLS * CELLS; k++)
         twin.height[k / CELLS][k % CELLS] /= maps;

@@ -1,5 +1,6 @@
 /* Meshes: OBJ input with good, bad and random text; closedness; transformation; mass against closed forms;
  * signed distance against brute force, with the sign from the winding number. */
+#include "base/angle.h"
 #include "base/file.h"
 #include "base/random.h"
 #include "mesh.h"
@@ -416,7 +417,7 @@ static void test_mass(void **state) {
         for (int level = 2; level < 6; level++) {
             assert_true(mesh_make_sphere(shifts[0], 1.0f, level, &mesh, &err));
             mesh_mass(&mesh, &mass);
-            double error = 4.0 / 3.0 * 3.14159265358979 - mass.volume;
+            double error = 4.0 / 3.0 * pi - mass.volume;
             assert_true(error > 0.0 && (level == 2 || fabs(error / last - 0.25) < 0.01));
             assert_true(fabs(mass.inertia[0][0] / mass.volume - 0.4) < 1.1 * error);
             last = error;
@@ -483,7 +484,7 @@ static double winding_number(const Mesh *mesh, const double p[3]) {
         }
         sum += 2.0 * atan2(determinant, scale);
     }
-    return sum / (4.0 * 3.14159265358979);
+    return sum / (4.0 * pi);
 }
 
 static void check_distances(Mesh *mesh, uint32_t count) {

@@ -1,5 +1,6 @@
 /* Boundary samples: distances, coverage, areas and normals on many shapes; exact grids; regions; thin plates;
  * refusals. */
+#include "base/angle.h"
 #include "base/random.h"
 #include "mesh.h"
 #include "sample.h"
@@ -282,7 +283,7 @@ static Mesh make_prism(int sides, double radius, double height) {
     char *text = malloc(room), *end = text;
     assert_non_null(text);
     for (int i = 0; i < sides; i++) {
-        double phi = 2.0 * 3.14159265358979 * i / sides, x = radius * cos(phi), z = radius * sin(phi);
+        double phi = 2.0 * pi * i / sides, x = radius * cos(phi), z = radius * sin(phi);
         end += sprintf(end, "v %.9g 0 %.9g\nv %.9g %.9g %.9g\n", x, z, x, height, z);
     }
     for (int i = 0; i < sides; i++) {

@@ -12,6 +12,7 @@
 #include <string.h>
 #include <cmocka.h>
 
+#include "engine/base/angle.h"
 #include "engine/base/file.h"
 #include "engine/base/random.h"
 
@@ -216,7 +217,7 @@ static void the_last_to_steer_wins(void **state) {
     const SkiffControls controls = helm_controls(&position);
     assert_float_equal(controls.rudder, -0.5, 0.0);
     position = at(text, 4);
-    assert_float_equal(helm_controls(&position).heading, 40.0 / 180 * 3.14159265358979323846, 1e-15);
+    assert_float_equal(helm_controls(&position).heading, 40.0 / 180 * pi, 1e-15);
 }
 
 static void scenes_bind_other_keys(void **state) {
