@@ -241,7 +241,7 @@ static bool find_results_folder(const CliArgs *args, char folder[PATH_MAX]) {
         snprintf(folder, PATH_MAX, "%s", args->results);
         return true;
     }
-    if (!realpath(args->scene, scene))
+    if (!realpath(args->operand, scene))
         return false;
     for (int i = 0; i < 3; i++) { /* file, scenes, assets */
         char *slash = strrchr(scene, '/');
@@ -358,7 +358,7 @@ static bool bench_scene(Bench *bench, Err *err) {
 }
 
 bool bench_command(const CliArgs *args, Err *err) {
-    Scene *scene = scene_load(args->scene, args->edits, args->edit_count, err);
+    Scene *scene = scene_load(args->operand, args->edits, args->edit_count, err);
     if (!scene)
         return false;
     Bench bench = {.args = args, .scene = scene};

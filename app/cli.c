@@ -77,6 +77,8 @@ typedef struct Command {
             .help = "Input file that drives and steers, in place of the scene's. Lines: TIME "               \
                     "throttle|rudder|heading VALUE, TIME press|release KEY, TIME camera NAME"                \
     }
+#define OPTION_ROW_JSON                                                                                      \
+    { 0, "json", NULL, OPTION_FLAG, AT(json), .help = "One line of JSON in place of the table" }
 #define OPTION_ROW_HELP                                                                                      \
     { 'h', "help", NULL, OPTION_FLAG, AT(help), .help = "Show this help" }
 
@@ -179,7 +181,7 @@ static const Option bench_options[] = {
     {0, "steps", "N", OPTION_INTEGER, AT(steps), .min = 1, .max = 1e6,
      .help = "Steps of a window (default 20)"},
     {0, "windows", "N", OPTION_INTEGER, AT(windows), .min = 1, .max = 1e4, .help = "Windows (default 5)"},
-    {0, "json", NULL, OPTION_FLAG, AT(json), .help = "One line of JSON in place of the table"},
+    OPTION_ROW_JSON,
     OPTION_ROW_INPUT,
     OPTION_ROWS_ENGINE,
     OPTION_ROW_SET,
@@ -190,9 +192,6 @@ static const Option bench_options[] = {
     {'q', "quiet", NULL, OPTION_FLAG, AT(quiet), .help = "No progress on stderr"},
     OPTION_ROW_HELP,
 };
-
-#define OPTION_ROW_JSON                                                                                      \
-    { 0, "json", NULL, OPTION_FLAG, AT(json), .help = "One line of JSON in place of the table" }
 
 static const Option profile_options[] = {
     OPTION_ROW_JSON,
@@ -588,14 +587,14 @@ static bool parse(const Command *command, int argc, char **argv, CliArgs *args, 
                 return false;
         } else if (!command->operand) {
             return err_set(err, ERR_USAGE, "takes options only, \"%.200s\" is given", argv[i]);
-        } else if (args->scene) {
+        } else if (args->operand) {
             return err_set(err, ERR_USAGE, "one %s at a time: \"%.200s\" and \"%.200s\" are given",
-                           command->operand, args->scene, argv[i]);
+                           command->operand, args->operand, argv[i]);
         } else {
-            args->scene = argv[i];
+            args->operand = argv[i];
         }
     }
-    if (command->needs_operand && !args->scene && !args->help && !args->schema)
+    if (command->needs_operand && !args->operand && !args->help && !args->schema)
         return err_set(err, ERR_USAGE, "the %s is missing", command->operand);
     return true;
 }

@@ -476,7 +476,7 @@ enum { EXPERIMENT_COUNT = sizeof experiments / sizeof *experiments };
 
 /* The sheets of what the user asked for. */
 static bool choose(Reproduction *run, Err *err) {
-    const char *wanted = run->args->scene ? run->args->scene : "all";
+    const char *wanted = run->args->operand ? run->args->operand : "all";
     const bool all = strcmp(wanted, "all") == 0;
     bool known = all;
     for (int e = 0; e < EXPERIMENT_COUNT; e++) {

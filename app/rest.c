@@ -122,7 +122,7 @@ bool rest_surface_command(const CliArgs *args, Err *err) {
 }
 
 bool rest_show_command(const CliArgs *args, Err *err) {
-    return finish_tile(skiff_tile_open(args->scene, err), args, err);
+    return finish_tile(skiff_tile_open(args->operand, err), args, err);
 }
 
 /* Where the user gave no corner: two support radii inside the outermost particles, past what walls and
@@ -143,7 +143,7 @@ static bool find_box(const CliArgs *args, const SkiffSim *sim, double min[3], do
                            "%s: nothing to cut: the box reaches from %g to %g m in %c (--min, --max; by "
                            "default %g m, two "
                            "support radii, inside the outermost particles)",
-                           args->scene, min[k], max[k], "xyz"[k], margin);
+                           args->operand, min[k], max[k], "xyz"[k], margin);
     }
     return true;
 }
@@ -152,12 +152,12 @@ bool rest_cut_command(const CliArgs *args, Err *err) {
     char scene_path[4096], state_path[4096];
     if (!args->output)
         return err_set(err, ERR_USAGE, "-o FILE is missing");
-    if (!file_exists(args->scene))
-        return err_set(err, ERR_INPUT, "%s: there is no such folder", args->scene);
+    if (!file_exists(args->operand))
+        return err_set(err, ERR_INPUT, "%s: there is no such folder", args->operand);
     if (!check_output(args, err))
         return false;
-    snprintf(scene_path, sizeof scene_path, "%.4000s/scene.json", args->scene);
-    snprintf(state_path, sizeof state_path, "%.4000s/state.skiff", args->scene);
+    snprintf(scene_path, sizeof scene_path, "%.4000s/scene.json", args->operand);
+    snprintf(state_path, sizeof state_path, "%.4000s/state.skiff", args->operand);
     Scene *scene = scene_load(scene_path, NULL, 0, err);
     if (!scene)
         return false;
@@ -236,7 +236,7 @@ static void print_filled(const Filled *filled, bool as_json) {
 }
 
 bool rest_fill_command(const CliArgs *args, Err *err) {
-    Scene *scene = scene_load(args->scene, args->edits, args->edit_count, err);
+    Scene *scene = scene_load(args->operand, args->edits, args->edit_count, err);
     if (!scene)
         return false;
     SkiffSim *sim = scene_start(scene, args->threads, (SkiffSimd)args->simd, err);
@@ -249,7 +249,7 @@ bool rest_fill_command(const CliArgs *args, Err *err) {
                err_set(err, ERR_INPUT,
                        "%s: nothing in it is filled with water at rest at the start; a block is with --set "
                        "FluidBlocks[0].fill=rest",
-                       args->scene);
+                       args->operand);
     }
     good = good && let_go(sim, args->free_steps, &filled, err);
     if (good)

@@ -27,7 +27,7 @@ static Scene *load_scene(const CliArgs *args, Err *err) {
         snprintf(duration, sizeof duration, "Configuration.duration=%.17g", args->duration);
         edits[count++] = duration;
     }
-    return scene_load(args->scene, edits, count, err);
+    return scene_load(args->operand, edits, count, err);
 }
 
 /* ---- The game loop ---- */
