@@ -32,6 +32,7 @@ typedef struct Bench {
     SkiffSim *sim;
     Pilot pilot;
     Window *windows;
+    double *figures; /* [windows] for medians */
     /* sums over all steps measured */
     double density_iterations, divergence_iterations, density_error, divergence_error, neighbours, solve_ms;
     double density_max; /* largest */
@@ -96,26 +97,18 @@ static double search_figure(const Window *window, int phase) {
            window->phase_ms[SKIFF_PHASE_BOUNDARY];
 }
 
-static int compare_doubles(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* Median, and the smallest and largest where wanted. */
 static double median(const Bench *bench, WindowFigure *figure, int phase, double *least, double *most) {
     int count = bench->args->windows;
-    double *values = malloc((size_t)count * sizeof *values);
-    if (!values)
-        abort();
+    double *values = bench->figures;
     for (int w = 0; w < count; w++)
         values[w] = figure(&bench->windows[w], phase);
-    qsort(values, (size_t)count, sizeof *values, compare_doubles);
+    summary_sort(values, (size_t)count);
     double middle = 0.5 * (values[(count - 1) / 2] + values[count / 2]);
     if (least)
         *least = values[0];
     if (most)
         *most = values[count - 1];
-    free(values);
     return middle;
 }
 
@@ -365,9 +358,11 @@ bool bench_command(const CliArgs *args, Err *err) {
     const bool read = pilot_read(&bench.pilot, scene, args->input, NULL, err);
     bench.sim = read ? scene_start(scene, args->threads, (SkiffSimd)args->simd, err) : NULL;
     bench.windows = calloc((size_t)args->windows, sizeof *bench.windows);
-    bool ok =
-        bench.sim && (bench.windows || err_set(err, ERR_IO, "out of memory")) && bench_scene(&bench, err);
+    bench.figures = calloc((size_t)args->windows, sizeof *bench.figures);
+    const bool memory = bench.windows && bench.figures;
+    bool ok = bench.sim && (memory || err_set(err, ERR_IO, "out of memory")) && bench_scene(&bench, err);
     free(bench.windows);
+    free(bench.figures);
     skiff_destroy(bench.sim);
     pilot_free(&bench.pilot);
     scene_free(scene);
