@@ -123,7 +123,7 @@ static void put_count(json_t *result, const char *key, uint64_t count) {
 }
 
 static void put_text(json_t *result, const char *key, const char *text) {
-    json_object_set_new(result, key, json_string(text));
+    json_object_set_new(result, key, json_text_string(text));
 }
 
 static void put_origin(const Bench *bench, json_t *result) {

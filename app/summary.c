@@ -136,8 +136,9 @@ json_t *summary_make(const Scene *scene, const SkiffSim *sim, const CsvTable *st
     snprintf(hash, sizeof hash, "%016" PRIx64, skiff_hash(sim));
     double computed_ms = column_sum(steps, "step_ms");
     double simulated = skiff_time(sim) - scene->def.start_time;
-    json_t *summary = json_pack("{ssssssssso}", "scene", scene->file, "title", scene->title, "status",
-                                end->status, "message", end->message, "state_hash", json_string(hash));
+    json_t *summary =
+        json_pack("{sossssso so}", "scene", json_text_string(scene->file), "title", scene->title, "status",
+                  end->status, "message", json_text_string(end->message), "state_hash", json_string(hash));
     json_object_set_new(summary, "steps", json_integer((json_int_t)skiff_step_count(sim)));
     json_object_set_new(summary, "time", json_text_double(skiff_time(sim)));
     json_object_set_new(summary, "time_step", json_text_float(skiff_params(sim)->time_step));

@@ -338,6 +338,15 @@ static void assert_same_end(const char *a, const char *b) {
     assert_same_file(in(a, "probes.csv"), in(b, "probes.csv"));
 }
 
+static void copy(const char *from, const char *to) {
+    char *bytes;
+    size_t size;
+    Err err = {0};
+    assert_true(file_read(from, 1 << 30, &bytes, &size, &err));
+    assert_true(file_write(to, bytes, size, &err));
+    free(bytes);
+}
+
 static void a_run_writes_its_results(void **state) {
     (void)state;
     static const char *const names[] = {"steps.csv",   "ledger.csv",   "hull.csv",
@@ -371,6 +380,23 @@ static void a_run_writes_its_results(void **state) {
     expect("profile nowhere", ERR_INPUT, NULL, "nowhere/steps.csv: ");
 }
 
+/* Names of files need not be UTF-8; JSON must be. */
+static void any_name_of_a_scene_will_do(void **state) {
+    (void)state;
+    copy(SMALL, "caf\xe9.json");
+    expect("run caf\xe9.json -o named -q --duration 0.003", 0, NULL, NULL);
+    json_t *summary = summary_of("named");
+    assert_string_equal(json_string_value(json_object_get(summary, "scene")), "caf?.json");
+    json_decref(summary);
+    assert_true(exists("named/report.html"));
+    assert_int_equal(mkdir("d\xe9", 0700), 0);
+    scratch_write("d\xe9/hull.obj", "");
+    scratch_write("d\xe9/a.json",
+                  "{\"version\": 1, \"RigidBodies\": [{\"name\": \"a\", \"geometryFile\": \"hull.obj\"}]}");
+    expect("check d\xe9/a.json", ERR_INPUT, NULL,
+           "RigidBodies[0].geometryFile: the name of its folder is not UTF-8 text");
+}
+
 static void an_existing_folder_is_refused(void **state) {
     (void)state;
     assert_int_equal(mkdir("kept", 0755), 0);
@@ -402,15 +428,6 @@ static void probes_have_their_own_rate(void **state) {
         assert_true(late > -1e-6 && late < 0.003);
     }
     csv_free(&probes);
-}
-
-static void copy(const char *from, const char *to) {
-    char *bytes;
-    size_t size;
-    Err err = {0};
-    assert_true(file_read(from, 1 << 30, &bytes, &size, &err));
-    assert_true(file_write(to, bytes, size, &err));
-    free(bytes);
 }
 
 static void a_resumed_run_equals_a_whole_one(void **state) {
@@ -757,6 +774,7 @@ int main(void) {
         cmocka_unit_test(check_prints_a_scene_and_writes_nothing),
         cmocka_unit_test(the_schema_is_printed),
         cmocka_unit_test(a_run_writes_its_results),
+        cmocka_unit_test(any_name_of_a_scene_will_do),
         cmocka_unit_test(an_existing_folder_is_refused),
         cmocka_unit_test(probes_have_their_own_rate),
         cmocka_unit_test(a_resumed_run_equals_a_whole_one),
