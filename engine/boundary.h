@@ -62,6 +62,7 @@ bool boundary_append(BoundarySet *set, const BoundarySamples *more, Err *err);
 void boundary_set_free(BoundarySet *set);
 /* Sizes what a step needs. */
 bool boundary_reserve(Boundary *boundary, uint32_t particle_capacity, int body_count, Err *err);
+/* The bodies' centres of mass, window-local. */
 void boundary_place_centres(Boundary *boundary, const Body *bodies, int body_count, const double origin[3]);
 /* Moves the bodies' samples to where the bodies are and sorts them. */
 bool boundary_place(Boundary *boundary, const Body *bodies, int body_count, const double origin[3],

@@ -28,19 +28,19 @@ typedef struct Rows {
     Buffer scratch; /* Scratch of every thread */
 } Rows;
 
-/* Neighbours, densities (fluid part) and gradient sums (fluid part, fixed-point units) of the sorted
- * particles. Grows the pool when it is too small, and turns to wide entries when offsets do not fit: both
- * happen in the first steps or never. `frozen` (NULL: none) marks particles that others see but that get no
- * row. */
+/* What rows are built from. */
 typedef struct RowsJob {
     const Passes *passes;
     const Grid *grid;
     const Particles *particles;
     const Kernel *kernel;
     float volume;          /* m^3, of a particle */
-    const uint8_t *frozen; /* [particles] or NULL */
+    const uint8_t *frozen; /* NULL, or [particles] 1: others see it, but it gets no row */
     int threads;
 } RowsJob;
+/* Neighbours, densities (fluid part) and gradient sums (fluid part, fixed-point units) of the sorted
+ * particles. Grows the pool when it is too small, and turns to wide entries when offsets do not fit: both
+ * happen in the first steps or never. ERR_DIVERGED: a particle has too many neighbours, and is named. */
 bool rows_build(Rows *rows, const RowsJob *job, Err *err);
 /* Room for `shape`, the moments that boundary_apply adds for rows_correct. */
 bool rows_reserve_correction(Rows *rows, const Particles *particles, Err *err);

@@ -215,6 +215,7 @@ typedef struct SkiffDef {
     SkiffSimd simd;
 } SkiffDef;
 
+/* Where every def begins: the defaults of a scene file. What has none (names, kinds of geometry) is zero. */
 SkiffDef skiff_def_default(void);
 SkiffGeometryDef skiff_geometry_default(void);
 SkiffBlockDef skiff_block_default(void);
@@ -249,8 +250,8 @@ bool skiff_remove_box(SkiffSim *sim, const double min[3], const double max[3], u
 
 double skiff_time(const SkiffSim *sim); /* s */
 uint64_t skiff_step_count(const SkiffSim *sim);
-const SkiffParams *skiff_params(const SkiffSim *sim);
-SkiffSimd skiff_simd(const SkiffSim *sim); /* the one in use, never AUTO */
+const SkiffParams *skiff_params(const SkiffSim *sim); /* the simulation's own */
+SkiffSimd skiff_simd(const SkiffSim *sim);            /* the one in use, never AUTO */
 const char *skiff_simd_name(SkiffSimd simd);
 int skiff_threads(const SkiffSim *sim);
 
@@ -353,6 +354,7 @@ enum {
 #undef PHASE
     SKIFF_PHASE_COUNT
 };
+/* Key: a word for files. Label: for people. Static strings. */
 const char *skiff_phase_key(int phase);
 const char *skiff_phase_label(int phase);
 
@@ -399,6 +401,7 @@ typedef struct SkiffStats {
     double phase_ms[SKIFF_PHASE_COUNT];
     double step_ms;
 } SkiffStats;
+/* Of the last step. */
 const SkiffStats *skiff_stats(const SkiffSim *sim);
 
 /* Where the window is. */
