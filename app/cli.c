@@ -55,12 +55,14 @@ typedef struct Command {
 /* ---- The tables ---- */
 
 #define AT(member) .offset = offsetof(CliArgs, member)
-#define OPTION_ROWS_ENGINE                                                                                   \
-    {0,           "threads",                                                                                 \
-     "N",         OPTION_INTEGER,                                                                            \
-     AT(threads), .min = 1,                                                                                  \
-     .max = 1024, .help = "Threads (default: one for each core). The results do not depend on it"},          \
+#define OPTION_ROW_THREADS                                                                                   \
     {                                                                                                        \
+        0, "threads", "N", OPTION_INTEGER, AT(threads),                                                      \
+            .min = 1, .max = SKIFF_MAX_THREADS,                                                              \
+            .help = "Threads (default: one for each core). The results do not depend on it"                  \
+    }
+#define OPTION_ROWS_ENGINE                                                                                   \
+    OPTION_ROW_THREADS, {                                                                                    \
         0, "simd", "ISA", OPTION_CHOICE, AT(simd),                                                           \
             .names = "auto|plain|avx2|avx512",                                                               \
             .help = "Instruction set: auto (default), plain, avx2 or avx512"                                 \
@@ -204,16 +206,14 @@ static const Option rest_make_options[] = {
      .help = "Edge in particle diameters (default 12: 2171 points)"},
     {0, "seed", "S", OPTION_INTEGER, AT(seed), .min = 0, .max = 2147483647,
      .help = "Which of the arrangements (default 1, the one that comes with the program)"},
-    {0, "threads", "N", OPTION_INTEGER, AT(threads), .min = 1, .max = 1024,
-     .help = "Threads (default: one for each core). The result does not depend on it"},
+    OPTION_ROW_THREADS,
     OPTION_ROW_JSON,
     OPTION_ROW_HELP,
 };
 
 static const Option rest_surface_options[] = {
     {'o', "output", "FILE", OPTION_TEXT, AT(output), .help = "Write the surface (default: measure it only)"},
-    {0, "threads", "N", OPTION_INTEGER, AT(threads), .min = 1, .max = 1024,
-     .help = "Threads (default: one for each core). The result does not depend on it"},
+    OPTION_ROW_THREADS,
     OPTION_ROW_JSON,
     OPTION_ROW_HELP,
 };

@@ -3,10 +3,9 @@
 #define SKIFF_ROWS_H
 
 #include "grid.h"
+#include "skiff.h"
 
 #include <stdatomic.h>
-
-enum { ROWS_MAX_THREADS = 256 };
 
 typedef struct RowShare {
     uint32_t next, end; /* entries of the pool this thread may still take */
@@ -23,7 +22,7 @@ typedef struct Rows {
     Buffer pool, weights, slices, density, gradient_sum, neighbour_counts;
     uint32_t pool_entries;
     atomic_uint pool_used;
-    RowShare shares[ROWS_MAX_THREADS];
+    RowShare shares[SKIFF_MAX_THREADS];
     Buffer gradients, corrected_sum, shape[2];
     Buffer scratch; /* Scratch of every thread */
 } Rows;

@@ -198,6 +198,8 @@ typedef struct SkiffSeaDef {
 
 typedef enum SkiffSimd { SKIFF_SIMD_AUTO, SKIFF_SIMD_PLAIN, SKIFF_SIMD_AVX2, SKIFF_SIMD_AVX512 } SkiffSimd;
 
+enum { SKIFF_MAX_THREADS = 256 };
+
 typedef struct SkiffDef {
     SkiffParams params;
     SkiffTankDef tank;
@@ -211,7 +213,7 @@ typedef struct SkiffDef {
     double start_time; /* s */
     bool has_domain;   /* false: bounds of everything, grown */
     float domain_min[3], domain_max[3];
-    int threads; /* 0: the number of physical cores this process may use */
+    int threads; /* up to SKIFF_MAX_THREADS; 0: the number of physical cores this process may use */
     SkiffSimd simd;
 } SkiffDef;
 
@@ -480,7 +482,7 @@ typedef struct SkiffTileDef {
     double volume_factor; /* volume of a particle, d^3 */
     uint64_t seed;
     int iterations; /* at most; the relaxation ends sooner when nothing moves any more */
-    int threads;    /* 0: as SkiffDef.threads; the result does not depend on it */
+    int threads;    /* as SkiffDef.threads; the result does not depend on it */
 } SkiffTileDef;
 
 typedef struct SkiffTileInfo {
