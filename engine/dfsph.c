@@ -123,7 +123,7 @@ static void total_partials(const Dfsph *dfsph, uint32_t blocks, int count, doubl
 
 /* ---- The operator ---- */
 
-/* What is held answers no pressure. Few slices hold any of it, and those are told by one comparison. */
+/* What is held answers no pressure: result = base for it. Few slices hold any, which one comparison tells. */
 static void hold_block(const uint8_t *held, const PairData *pairs, const AccelerateJob *job, uint32_t block) {
     EACH_SLICE {
         if (memcmp(held + first, NONE_HELD, SLICE) == 0)
@@ -131,8 +131,10 @@ static void hold_block(const uint8_t *held, const PairData *pairs, const Acceler
         for (uint32_t i = first; i < first + SLICE; i++) {
             if (!held[i])
                 continue;
-            for (int k = 0; k < 3; k++)
-                job->result[i][k] = job->base != NULL ? job->base[i][k] : 0.0f;
+            memset(job->result[i], 0, sizeof(Float4));
+            if (job->base == NULL)
+                continue; /* the usual case: no position is fetched */
+            memcpy(job->result[i], job->base[i], 3 * sizeof(float));
             job->result[i][3] = vector_moment(pairs, pairs->position[i], job->result[i]);
         }
     }
