@@ -61,7 +61,7 @@ static bool check_args(Redraw *redraw, Err *err) {
                        "%s/particles: there are no saved particles; `skiff run` saves them with "
                        "--save-particles FPS",
                        args->operand);
-    return true;
+    return file_check_directory(redraw->output, err);
 }
 
 /* The saved frames say how many of them a second there are; a film of them has that rate. */

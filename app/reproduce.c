@@ -16,6 +16,7 @@
 #include "engine/base/file.h"
 
 #include <assert.h>
+#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -498,7 +499,8 @@ static bool prepare_folder(Reproduction *run, Err *err) {
     }
     const char *temporary = getenv("TMPDIR");
     snprintf(run->folder, sizeof run->folder, "%.4000s/skiff-XXXXXX", temporary ? temporary : "/tmp");
-    return mkdtemp(run->folder) || err_set(err, ERR_IO, "%s: cannot be created", run->folder);
+    return mkdtemp(run->folder) ||
+           err_set(err, ERR_IO, "%s: cannot make directory: %s", run->folder, strerror(errno));
 }
 
 bool reproduce_carensac_command(const CliArgs *args, Err *err) {

@@ -43,7 +43,7 @@ bool run_check_args(const CliArgs *args, Err *err) {
             args->output);
     if (!exists && args->resume)
         return err_set(err, ERR_USAGE, "%s: there is no such folder to resume", args->output);
-    return true;
+    return file_check_directory(args->output, err);
 }
 
 /* First place where two documents differ, as a path. */

@@ -22,7 +22,7 @@ typedef struct Run {
     double next_flush, next_checkpoint; /* s, wall clock */
 } Run;
 
-/* Whether the options fit what the output folder is. Changes nothing. */
+/* Whether the options fit what the output folder is, and files can be written there. Changes nothing. */
 bool run_check_args(const CliArgs *args, Err *err);
 /* Whether the folder holds a checkpoint of a run of this scene: what can be said before the scene becomes a
  * simulation. ERR_INPUT. */

@@ -31,6 +31,9 @@ bool file_write(const char *path, const void *data, size_t size, Err *err);
 
 /* Creates a directory and its parents; fine when it exists. ERR_IO. */
 bool file_make_directory(const char *path, Err *err);
+/* Whether files could be written into a directory that is there or could be made. Changes nothing, and cannot
+ * know everything: a disk may be full. ERR_IO. */
+bool file_check_directory(const char *path, Err *err);
 /* Anything of that name. */
 bool file_exists(const char *path);
 

@@ -336,6 +336,28 @@ static void directories_with_parents(void **state) {
     memset(name, 'a', sizeof name - 1);
     assert_false(file_make_directory(name, &err));
     assert_non_null(strstr(err.message, "name too long"));
+    assert_false(file_check_directory(name, &err));
+}
+
+static void directories_are_checked_beforehand(void **state) {
+    (void)state;
+    Err err = {0};
+    assert_true(file_make_directory("there", &err) && file_write("there/file", "", 0, &err));
+    static const char *const good[] = {"there", "there/", "there/a/b", "a", "a/", "./a", ".", "//tmp/a/"};
+    for (size_t i = 0; i < sizeof good / sizeof *good; i++)
+        if (!file_check_directory(good[i], &err))
+            fail_msg("%s: %s", good[i], err.message);
+    assert_false(file_exists("a") || file_exists("there/a"));
+    assert_false(file_check_directory("there/file/a/b", &err));
+    assert_int_equal(err.code, ERR_IO);
+    assert_string_equal(err.message, "there/file: cannot write: Not a directory");
+    assert_false(file_check_directory("", &err));
+    if (geteuid() == 0)
+        return; /* may write anywhere */
+    assert_int_equal(chmod("there", 0500), 0);
+    assert_false(file_check_directory("there/a", &err));
+    assert_string_equal(err.message, "there: cannot write: Permission denied");
+    assert_int_equal(chmod("there", 0700), 0);
 }
 
 /* ---- log ---- */
@@ -382,6 +404,7 @@ int main(void) {
         cmocka_unit_test(file_is_seen_only_when_committed),
         cmocka_unit_test(file_write_failures_leave_nothing),
         cmocka_unit_test(directories_with_parents),
+        cmocka_unit_test(directories_are_checked_beforehand),
         cmocka_unit_test(log_reaches_the_sink),
     };
     return cmocka_run_group_tests_name("base", tests, scratch_enter, scratch_leave);

@@ -410,6 +410,7 @@ static void an_existing_folder_is_refused(void **state) {
     assert_true(exists("kept/report.html") && exists("kept/other.txt"));
     scratch_write("file", "");
     expect("run " SMALL " -o file --force", ERR_USAGE, NULL, "file: exists and is not a folder");
+    expect("run " SMALL " -o file/a", ERR_IO, NULL, "file: cannot write: Not a directory");
     expect("run " SMALL " -o file/below --duration 0.01", ERR_IO, NULL, "file");
 }
 
