@@ -64,8 +64,7 @@ typedef struct Command {
 #define OPTION_ROWS_ENGINE                                                                                   \
     OPTION_ROW_THREADS, {                                                                                    \
         0, "simd", "ISA", OPTION_CHOICE, AT(simd),                                                           \
-            .names = "auto|plain|avx2|avx512",                                                               \
-            .help = "Instruction set: auto (default), plain, avx2 or avx512"                                 \
+            .names = SKIFF_SIMD_NAMES, .help = "Instruction set: auto (default), plain, avx2 or avx512"      \
     }
 #define OPTION_ROW_SET                                                                                       \
     {                                                                                                        \

@@ -487,8 +487,13 @@ static bool choose(Reproduction *run, Err *err) {
         if (!carensac_sheet(experiments[e].sheet, &run->sheets[experiments[e].sheet], err))
             return false;
     }
-    return known || err_set(err, ERR_USAGE,
-                            "expected table1, fig2, fig4c, fig5, boat or all, found \"%.80s\"", wanted);
+    if (known)
+        return true;
+    char names[128] = "";
+    for (int e = 0; e < EXPERIMENT_COUNT; e++)
+        snprintf(names + strlen(names), sizeof names - strlen(names), "%s%s", e > 0 ? ", " : "",
+                 experiments[e].name);
+    return err_set(err, ERR_USAGE, "expected %s or all, found \"%.80s\"", names, wanted);
 }
 
 /* The results' folder, or without one a temporary folder for the set-ups' meshes. */

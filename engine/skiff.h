@@ -197,6 +197,7 @@ typedef struct SkiffSeaDef {
 } SkiffSeaDef;
 
 typedef enum SkiffSimd { SKIFF_SIMD_AUTO, SKIFF_SIMD_PLAIN, SKIFF_SIMD_AVX2, SKIFF_SIMD_AVX512 } SkiffSimd;
+#define SKIFF_SIMD_NAMES "auto|plain|avx2|avx512" /* as skiff_simd_name has them */
 
 enum { SKIFF_MAX_THREADS = 256 };
 
