@@ -167,7 +167,7 @@ static void the_shipped_schema_is_current(void **state) {
     free(text);
 }
 
-static void test_simd_names(void **state) {
+static void instruction_sets_have_their_words(void **state) {
     (void)state;
     char list[128] = "";
     for (int i = SKIFF_SIMD_AUTO; i <= SKIFF_SIMD_AVX512; i++)
@@ -178,7 +178,7 @@ static void test_simd_names(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_simd_names),
+        cmocka_unit_test(instruction_sets_have_their_words),
         cmocka_unit_test(keys_are_unique),
         cmocka_unit_test(defaults_are_in_range),
         cmocka_unit_test(every_range_is_checked),
