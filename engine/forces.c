@@ -93,6 +93,11 @@ void forces_apply_fluid(const DfsphProblem *problem, Dfsph *dfsph) {
         for (uint32_t block = 0; block < blocks; block++)
             problem->passes->forces(&job, block);
 #pragma omp for schedule(static)
+        for (uint32_t i = 0; i < (problem->rows->beside != NULL ? particles->count : 0); i++)
+            for (int k = 0; k < 3; k++)
+                job.result[i][k] -=
+                    params->viscosity * problem->rows->beside[i].share * particles->velocity[i][k];
+#pragma omp for schedule(static)
         for (uint32_t i = 0; i < (problem->held != NULL ? particles->count : 0); i++)
             if (problem->held[i])
                 memcpy(job.result[i], particles->velocity[i], sizeof(Float4));

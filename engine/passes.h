@@ -53,6 +53,10 @@ static inline int32_t cell_grid_index(const CellGrid *grid, int32_t x, int32_t y
     return (x * grid->size[2] + z) * grid->size[1] + y;
 }
 
+static inline size_t cell_grid_count(const CellGrid *grid) {
+    return (size_t)grid->size[0] * (size_t)grid->size[1] * (size_t)grid->size[2];
+}
+
 /* Terms of one particle against one wall or body, summed over its samples b of volume psi_b: g = sum psi_b
  * grad W_ib, t = sum psi_b (x_b - c) x grad W_ib with c the object's centre (origin for walls). They replace
  * the samples in every iteration. */
@@ -68,22 +72,32 @@ typedef struct ContactSpan {
     uint32_t start, count;
 } ContactSpan;
 
-/* Samples of walls or of bodies, sorted by cell. */
+/* Samples of walls or of bodies, or points of standing water, sorted by cell. */
 typedef struct SampleSet {
     CellGrid grid;
     const uint8_t *occupied; /* [cells] 1 where any of the 27 cells around holds a sample */
     const float *x, *y, *z;  /* m; padded by a slice */
-    const float *volume;     /* psi, m^3 */
-    const int32_t *object;   /* grouped within a cell */
+    const float *value;      /* psi, m^3; of standing water P, m^2 */
+    const int32_t *object;   /* grouped within a cell; standing water has none */
     uint32_t count;
 } SampleSet;
+
+/* What water that stands still gives a particle. To the solves it is a wall that presses: it needs no rows,
+ * and no iteration visits it. */
+typedef struct Standing {
+    float push[3];  /* sum P V grad W, m */
+    float share;    /* sum V W: its part of the density */
+    float apart[3]; /* sum of (r - d) along the line to the particle, of those at a distance d below r = h /
+                       4, m */
+    float touching; /* how many are nearer than r / 2 */
+} Standing;
 
 /* Samples near one cell. */
 typedef struct NearSamples {
     int32_t cell; /* -1: none yet */
     int count;
     float x[MAX_NEAR_SAMPLES + LANES], y[MAX_NEAR_SAMPLES + LANES], z[MAX_NEAR_SAMPLES + LANES];
-    float volume[MAX_NEAR_SAMPLES + LANES];
+    float value[MAX_NEAR_SAMPLES + LANES];
     int32_t object[MAX_NEAR_SAMPLES + LANES];
 } NearSamples;
 
@@ -95,7 +109,7 @@ typedef struct Scratch {
     int32_t lists[ROW_GROUP * (MAX_NEIGHBOURS + LANES) + 3 * LANES],
         far[ROW_GROUP * MAX_NEIGHBOURS + 3 * LANES];
     uint32_t list_start[ROW_GROUP], far_start[ROW_GROUP];
-    NearSamples near[2]; /* walls, bodies */
+    NearSamples near[3]; /* walls, bodies, standing water */
     Contact contacts[BLOCK * MAX_CONTACT_OBJECTS];
 } Scratch;
 
@@ -193,7 +207,10 @@ typedef struct BoundaryJob {
     float *density;       /* NULL: list the contacts only */
     Float4 *gradient_sum; /* in: as the search left it; out: with the boundary, [3] the diagonal */
     uint16_t *neighbours;
-    Float4 *shape[2]; /* NULL, or out: moments of the walls, see CorrectionJob */
+    Float4 *shape[2];          /* NULL, or out: moments of the walls, see CorrectionJob */
+    const SampleSet *standing; /* NULL, or water that stands still */
+    float volume;              /* V, m^3 */
+    Standing *beside;          /* with it, out */
 } BoundaryJob;
 
 /* Gradients that are right for linear fields, made in two passes over the rows [Bonet & Lok 1999, kept

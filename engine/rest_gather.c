@@ -240,22 +240,23 @@ static void append(const Gather *gather, Particles *points, uint32_t i, uint64_t
     points->id[to] = id;
 }
 
-/* Existing water that the cloud's points can feel. It presses as still water does: its own pressures are
- * those of one step, and swing by their own size from step to step. */
+/* Existing water that the points which may settle can feel. It presses as still water does: its own pressures
+ * are those of one step, and swing by their own size from step to step. */
 static void add_existing(Gather *gather) {
     SkiffSim *sim = gather->sim;
-    Particles *points = &sim->rest.points;
-    memset(gather->marks, 0, gather->cell_count);
-    mark_points(gather, points->position[0], points->count, NEAR);
-    dilate(gather, NEAR, AROUND);
+    const Particles *points = &sim->rest.points;
     size_t cell;
+    memset(gather->marks, 0, gather->cell_count);
+    for (uint32_t i = 0; i < points->count; i++) {
+        const RestKind kind = rest_kind(points->id[i]);
+        if ((kind == REST_FLUID || kind == REST_AIR) && cell_of(&gather->cells, points->position[i], &cell))
+            gather->marks[cell] |= NEAR;
+    }
+    dilate(gather, NEAR, AROUND);
     for (uint32_t i = 0; i < sim->particles.count; i++) {
         const float *p = sim->particles.position[i];
-        if (!cell_of(&gather->cells, p, &cell) || !(gather->marks[cell] & AROUND))
-            continue;
-        const uint32_t to = particles_append(points, p, sim->particles.velocity[i], 0.0);
-        points->id[to] = rest_id(REST_EXISTING, i);
-        points->pressure[to] = still_pressure(gather, p);
+        if (cell_of(&gather->cells, p, &cell) && gather->marks[cell] & AROUND)
+            standing_add(&sim->rest.standing, p, still_pressure(gather, p));
     }
 }
 
@@ -279,24 +280,23 @@ bool rest_gather(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err
         water += fate[i] == IN_CLOUD + REST_FLUID || fate[i] == IN_CLOUD + REST_SUPPORT;
     }
     /* the cloud, in its order; then what exists around it */
-    cloud->points.count = 0;
+    cloud->points.count = cloud->standing.count = 0;
     fill->particles = bulk;
     if (near == 0 && bulk == 0)
         return true;
-    if (!particles_reserve(&cloud->points, near + sim->particles.count, err) ||
+    if (!particles_reserve(&cloud->points, near, err) ||
+        !standing_reserve(&cloud->standing, near + sim->particles.count, err) ||
         !buffer_reserve(&cloud->frozen, "frozen points", cloud->points.capacity + SLICE, err) ||
-        !buffer_reserve(&cloud->held, "held points", cloud->points.capacity + SLICE, err) ||
         !sim_reserve(sim, sim->particles.count + bulk + water, err))
         return false;
     for (uint32_t i = 0; i < laid; i++)
         if (fate[i] >= IN_CLOUD)
             append(&gather, &cloud->points, i, rest_id((RestKind)(fate[i] - IN_CLOUD), cloud->points.count),
                    0.0);
-    cloud->has_existing = near > 0 && sim->particles.count > 0;
-    if (cloud->has_existing)
+    if (near > 0 && sim->particles.count > 0)
         add_existing(&gather);
     for (uint32_t i = 0; i < laid; i++)
         if (fate[i] == BULK)
             append(&gather, &sim->particles, i, sim->particles.next_id, request->birth);
-    return true;
+    return standing_sort(&cloud->standing, sim->kernel.support, err);
 }

@@ -124,6 +124,11 @@ bool rows_build(Rows *rows, const RowsJob *build, Err *err) {
     }
 }
 
+bool rows_reserve_standing(Rows *rows, const Particles *particles, Err *err) {
+    return buffer_reserve(&rows->standing, "terms of standing water",
+                          (particles->capacity + SLICE) * sizeof(Standing), err);
+}
+
 bool rows_reserve_correction(Rows *rows, const Particles *particles, Err *err) {
     const size_t bytes = (particles->capacity + SLICE) * sizeof(Float4);
     const size_t gradients = (size_t)rows->pool_entries * 3 * SLICE * sizeof(int16_t);
@@ -162,6 +167,7 @@ void rows_free(Rows *rows) {
     buffer_free(&rows->corrected_sum);
     buffer_free(&rows->shape[0]);
     buffer_free(&rows->shape[1]);
+    buffer_free(&rows->standing);
     buffer_free(&rows->pool);
     buffer_free(&rows->weights);
     buffer_free(&rows->slices);

@@ -310,7 +310,7 @@ static ContactSum *contact_sum_of(ContactSums *sums, int32_t object) {
 static bool contact_add(const BoundaryJob *job, const NearSamples *near, int s, Vm in_reach, const Vf d[3],
                         Vf distance_sq, ContactSums *sums) {
     const bool shaped = job->shape[0] != NULL;
-    const Vf volume = vf_load(near->volume + s);
+    const Vf volume = vf_load(near->value + s);
     const Vi object = vi_load(near->object + s);
     Vf factor, weight;
     pair_kernel(&job->kernel, distance_sq, &factor, &weight);
@@ -365,17 +365,22 @@ static bool gather_samples(const BoundaryJob *job, const SampleSet *set, const i
             vf_compress(near->x + to, x, mine);
             vf_compress(near->y + to, y, mine);
             vf_compress(near->z + to, z, mine);
-            vf_compress(near->volume + to, vf_load(set->volume + s), mine);
-            near->count += vi_compress(near->object + to, vi_load(set->object + s), mine);
+            vf_compress(near->value + to, vf_load(set->value + s), mine);
+            if (set->object != NULL)
+                vi_compress(near->object + to, vi_load(set->object + s), mine);
+            near->count += __builtin_popcount(mine);
         }
     }
     vf_store(near->x + near->count, vf_set(1e18f)); /* the last lanes are near nothing */
     return true;
 }
 
-static bool contacts_of_particle(const BoundaryJob *job, const SampleSet *set, const float *p,
-                                 NearSamples *near, ContactSums *sums) {
+/* Copies together the samples that may be near p, unless they are there from the particle before. *count: of
+ * them. False: there are too many. */
+static bool samples_near(const BoundaryJob *job, const SampleSet *set, const float *p, NearSamples *near,
+                         int *count) {
     int32_t c[3];
+    *count = 0;
     for (int k = 0; k < 3; k++) {
         c[k] = (int32_t)floorf((p[k] - set->grid.origin[k]) * set->grid.inv_size);
         if (c[k] < 0 || c[k] >= set->grid.size[k])
@@ -386,8 +391,17 @@ static bool contacts_of_particle(const BoundaryJob *job, const SampleSet *set, c
         return true;
     if (near->cell != cell && !gather_samples(job, set, c, near))
         return false;
+    *count = near->count;
+    return true;
+}
+
+static bool contacts_of_particle(const BoundaryJob *job, const SampleSet *set, const float *p,
+                                 NearSamples *near, ContactSums *sums) {
+    int count;
+    if (!samples_near(job, set, p, near, &count))
+        return false;
     const Vf limit = vf_set(job->kernel.support * job->kernel.support);
-    for (int s = 0; s < near->count; s += LANES) {
+    for (int s = 0; s < count; s += LANES) {
         const Vf d[3] = {vf_sub(vf_set(p[0]), vf_load(near->x + s)),
                          vf_sub(vf_set(p[1]), vf_load(near->y + s)),
                          vf_sub(vf_set(p[2]), vf_load(near->z + s))};
@@ -398,6 +412,72 @@ static bool contacts_of_particle(const BoundaryJob *job, const SampleSet *set, c
     }
     return true;
 }
+
+/* ---- Standing water ---- */
+
+/* Sums over standing water near one particle, a lane a point. */
+typedef struct StandingSum {
+    int count, touching;
+    Vf weight, g[3], push[3], apart[3];
+} StandingSum;
+
+/* Adds up to sixteen points beginning at s; in_reach: their lanes. */
+static void standing_add(const BoundaryJob *job, const NearSamples *near, int s, Vm in_reach, const Vf d[3],
+                         Vf distance_sq, StandingSum *sum) {
+    const float unit = job->kernel.gradient_scale * job->kernel.inv_support / FACTOR_STEPS;
+    const float r = 0.25f * job->kernel.support;
+    const Vf p = vf_mask(in_reach, vf_load(near->value + s)); /* the last lanes may hold anything */
+    Vf factor, weight;
+    pair_kernel(&job->kernel, distance_sq, &factor, &weight);
+    factor = vf_mul(factor, vf_set(-unit * job->volume));
+    sum->weight = vf_fma(vf_mask(in_reach, weight), vf_set(job->volume), sum->weight);
+    for (int k = 0; k < 3; k++) {
+        const Vf g = vf_mask(in_reach, vf_mul(factor, d[k]));
+        sum->g[k] = vf_add(g, sum->g[k]);
+        sum->push[k] = vf_fma(g, p, sum->push[k]);
+    }
+    sum->count += __builtin_popcount(in_reach);
+    const Vm close = vf_less(distance_sq, vf_set(r * r));
+    if (close == 0)
+        return;
+    const Vf lack = vf_fma(vf_set(r), vf_rsqrt(distance_sq), vf_set(-1.0f));
+    for (int k = 0; k < 3; k++)
+        sum->apart[k] = vf_add(vf_mask(close, vf_mul(lack, d[k])), sum->apart[k]);
+    sum->touching += __builtin_popcount(vf_less(distance_sq, vf_set(0.25f * r * r)));
+}
+
+/* Terms of standing water for particle i: its gradients also go to g. False: there is too much of it. */
+static bool add_standing(const BoundaryJob *job, uint32_t i, NearSamples *near, float g[3]) {
+    const float *x = job->position[i];
+    const Vf limit = vf_set(job->kernel.support * job->kernel.support);
+    StandingSum sum = {.weight = vf_zero()};
+    int count;
+    for (int k = 0; k < 3; k++)
+        sum.g[k] = sum.push[k] = sum.apart[k] = vf_zero();
+    if (!samples_near(job, job->standing, x, near, &count))
+        return false;
+    for (int s = 0; s < count; s += LANES) {
+        const Vf d[3] = {vf_sub(vf_set(x[0]), vf_load(near->x + s)),
+                         vf_sub(vf_set(x[1]), vf_load(near->y + s)),
+                         vf_sub(vf_set(x[2]), vf_load(near->z + s))};
+        const Vf distance_sq = vf_fma(d[0], d[0], vf_fma(d[1], d[1], vf_mul(d[2], d[2])));
+        const Vm in_reach = vf_less(distance_sq, limit);
+        if (in_reach != 0)
+            standing_add(job, near, s, in_reach, d, distance_sq, &sum);
+    }
+    Standing *beside = &job->beside[i];
+    *beside = (Standing){.share = vf_sum(sum.weight), .touching = (float)sum.touching};
+    for (int k = 0; k < 3; k++) {
+        beside->push[k] = vf_sum(sum.push[k]);
+        beside->apart[k] = vf_sum(sum.apart[k]);
+        g[k] += vf_sum(sum.g[k]);
+    }
+    job->density[i] += beside->share;
+    job->neighbours[i] = (uint16_t)(job->neighbours[i] + sum.count);
+    return sum.count <= MAX_NEIGHBOURS;
+}
+
+/* ---- Both ---- */
 
 /* Samples push along the line to the particle, so their moments about the object's centre are the sum's at
  * the particle. */
@@ -413,7 +493,7 @@ static void turn_of_push(const BoundaryJob *job, Contact *contact) {
 
 int PASSES_NAME(boundary_)(const BoundaryJob *job, uint32_t block, Scratch *scratch, uint32_t *fault) {
     int contact_count = 0;
-    scratch->near[0].cell = scratch->near[1].cell = -1;
+    scratch->near[0].cell = scratch->near[1].cell = scratch->near[2].cell = -1;
     const uint32_t begin = block * BLOCK, end = begin + BLOCK < job->count ? begin + BLOCK : job->count;
     for (uint32_t k = begin; k < end; k++) {
         const uint32_t i = job->member[k];
@@ -432,6 +512,10 @@ int PASSES_NAME(boundary_)(const BoundaryJob *job, uint32_t block, Scratch *scra
             }
         }
         float g[3] = {0};
+        if (job->density != NULL && job->standing != NULL && !add_standing(job, i, &scratch->near[2], g)) {
+            *fault = i;
+            return -1;
+        }
         for (int s = 0; shaped && s < sums.count; s++)
             for (int a = 0; a < 6; a++)
                 job->shape[a / 3][i][a % 3] += vf_sum(sums.sums[s].m[a]);

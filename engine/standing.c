@@ -1,0 +1,99 @@
+#include "standing.h"
+
+#include <assert.h>
+#include <math.h>
+
+bool standing_reserve(StandingWater *water, uint32_t capacity, Err *err) {
+    if (capacity <= water->capacity)
+        return true;
+    if (!buffer_reserve(&water->point_buffer, "standing water", capacity * sizeof(Float4), err))
+        return false;
+    water->points = water->point_buffer.data;
+    water->capacity = capacity;
+    return true;
+}
+
+void standing_add(StandingWater *water, const float position[3], float pressure) {
+    assert(water->count < water->capacity);
+    float *point = water->points[water->count++];
+    memcpy(point, position, 3 * sizeof(float));
+    point[3] = pressure;
+}
+
+void standing_scale(StandingWater *water, float factor) {
+    float *value = (float *)water->set.value;
+    for (uint32_t i = 0; i < water->count; i++) {
+        water->points[i][3] *= factor;
+        value[i] *= factor;
+    }
+}
+
+static bool reserve_sorted(StandingWater *water, Err *err) {
+    const size_t cells = cell_grid_count(&water->set.grid), padded = water->count + (size_t)SLICE;
+    if (!buffer_reserve(&water->sorted, "standing water by cell", 4 * padded * sizeof(float), err) ||
+        !buffer_reserve(&water->cells, "cells of standing water", water->count * sizeof(uint32_t), err) ||
+        !buffer_reserve(&water->start, "cell starts of standing water", (cells + 2) * sizeof(uint32_t),
+                        err) ||
+        !buffer_reserve(&water->occupied, "cells near standing water", cells, err))
+        return false;
+    float *sorted = water->sorted.data;
+    water->set.x = sorted;
+    water->set.y = sorted + padded;
+    water->set.z = sorted + 2 * padded;
+    water->set.value = sorted + 3 * padded;
+    water->set.grid.start = water->start.data;
+    water->set.occupied = water->occupied.data;
+    return true;
+}
+
+static bool lay_out(StandingWater *water, float cell_size, Err *err) {
+    GridBounds bounds = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    for (uint32_t i = 0; i < water->count; i++)
+        for (int k = 0; k < 3; k++) {
+            const float x = water->points[i][k];
+            bounds.min[k] = x < bounds.min[k] ? x : bounds.min[k];
+            bounds.max[k] = x > bounds.max[k] ? x : bounds.max[k];
+        }
+    /* two empty layers: the 27 cells around an occupied one, and around those, exist */
+    return grid_layout(&water->set.grid, &bounds, cell_size, 2) ||
+           err_set(err, ERR_DIVERGED, "the water around a fill spreads over more than %d cells of %g m",
+                   GRID_MAX_CELLS, (double)cell_size);
+}
+
+bool standing_sort(StandingWater *water, float cell_size, Err *err) {
+    SampleSet *set = &water->set;
+    set->count = water->count;
+    if (water->count == 0)
+        return true;
+    if (!lay_out(water, cell_size, err) || !reserve_sorted(water, err))
+        return false;
+    /* start[c + 1] runs from a cell's first to its last while they are dealt out */
+    uint32_t *start = water->start.data, *cell = water->cells.data;
+    const size_t cells = cell_grid_count(&set->grid);
+    memset(start, 0, (cells + 2) * sizeof(uint32_t));
+    for (uint32_t i = 0; i < water->count; i++) {
+        cell[i] = grid_cell_of(&set->grid, water->points[i]);
+        start[cell[i] + 2]++;
+    }
+    for (size_t c = 0; c < cells; c++)
+        start[c + 2] += start[c + 1];
+    float *x = (float *)set->x, *y = (float *)set->y, *z = (float *)set->z, *value = (float *)set->value;
+    for (uint32_t i = 0; i < water->count; i++) {
+        const uint32_t to = start[cell[i] + 1]++;
+        x[to] = water->points[i][0];
+        y[to] = water->points[i][1];
+        z[to] = water->points[i][2];
+        value[to] = water->points[i][3];
+    }
+    grid_mark_occupied(&set->grid, water->occupied.data);
+    return true;
+}
+
+void standing_free(StandingWater *water) {
+    buffer_free(&water->point_buffer);
+    buffer_free(&water->sorted);
+    buffer_free(&water->cells);
+    buffer_free(&water->start);
+    buffer_free(&water->occupied);
+    *water = (StandingWater){0};
+}
