@@ -66,7 +66,7 @@ static float wall_density(const SkiffSim *sim, const float p[3]) {
         const int32_t cell = cell_grid_index(grid, c[0] + run / 3 - 1, c[1], c[2] + run % 3 - 1);
         for (uint32_t s = grid->start[cell - 1]; s < grid->start[cell + 2]; s++) {
             const float dx = p[0] - walls->x[s], dy = p[1] - walls->y[s], dz = p[2] - walls->z[s];
-            sum += (double)(walls->value[s] * kernel_w(&sim->kernel, sqrtf(dx * dx + dy * dy + dz * dz)));
+            sum += (double)(walls->volume[s] * kernel_w(&sim->kernel, sqrtf(dx * dx + dy * dy + dz * dz)));
         }
     }
     return (float)sum;

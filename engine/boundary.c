@@ -160,12 +160,27 @@ static bool set_reserve(BoundarySet *set, size_t cells, Err *err) {
     set->sorted.x = x;
     set->sorted.y = x + padded;
     set->sorted.z = x + 2 * padded;
-    set->sorted.value = x + 3 * padded;
+    set->sorted.volume = x + 3 * padded;
     set->sorted.object = (int32_t *)(x + 4 * padded);
     set->origin = (uint32_t *)(x + 5 * padded);
     set->sorted.grid.start = set->cells.data;
     set->sorted.occupied = set->occupied.data;
     return true;
+}
+
+static void mark_occupied(const CellGrid *grid, uint8_t *occupied) {
+    const size_t cells = (size_t)grid->size[0] * (size_t)grid->size[1] * (size_t)grid->size[2];
+    memset(occupied, 0, cells);
+    for (int32_t x = 1; x + 1 < grid->size[0]; x++)
+        for (int32_t z = 1; z + 1 < grid->size[2]; z++)
+            for (int32_t y = 1; y + 1 < grid->size[1]; y++) {
+                const int32_t cell = cell_grid_index(grid, x, y, z);
+                if (grid->start[cell] == grid->start[cell + 1])
+                    continue;
+                for (int32_t dx = -1; dx <= 1; dx++)
+                    for (int32_t dz = -1; dz <= 1; dz++)
+                        memset(occupied + cell_grid_index(grid, x + dx, y - 1, z + dz), 1, 3);
+            }
 }
 
 static bool in_reach(const BoundarySet *set, uint32_t s) {
@@ -195,7 +210,7 @@ bool boundary_sort(BoundarySet *set, float cell_size, Err *err) {
         return err_set(err, ERR_DIVERGED, "the boundary samples spread over more than %d cells of %g m",
                        GRID_MAX_CELLS, (double)cell_size);
     const CellGrid *grid = &set->sorted.grid;
-    const size_t cells = cell_grid_count(grid);
+    const size_t cells = (size_t)grid->size[0] * (size_t)grid->size[1] * (size_t)grid->size[2];
     if (!set_reserve(set, cells, err))
         return false;
     uint32_t *start = set->cells.data;
@@ -207,7 +222,7 @@ bool boundary_sort(BoundarySet *set, float cell_size, Err *err) {
         start[c + 1] += start[c];
     /* samples come grouped by object, and a stable sort keeps them so within a cell */
     float *x = (float *)set->sorted.x, *y = (float *)set->sorted.y, *z = (float *)set->sorted.z;
-    float *value = (float *)set->sorted.value;
+    float *volume = (float *)set->sorted.volume;
     int32_t *object = (int32_t *)set->sorted.object;
     for (uint32_t s = 0; s < count; s++) {
         if (!in_reach(set, s))
@@ -216,13 +231,13 @@ bool boundary_sort(BoundarySet *set, float cell_size, Err *err) {
         x[to] = set->world[s][0];
         y[to] = set->world[s][1];
         z[to] = set->world[s][2];
-        value[to] = set->world[s][3];
+        volume[to] = set->world[s][3];
         object[to] = set->samples.object[s];
         set->origin[to] = s;
     }
     memmove(start + 1, start, cells * sizeof(uint32_t));
     start[0] = 0;
-    grid_mark_occupied(grid, set->occupied.data);
+    mark_occupied(grid, set->occupied.data);
     return true;
 }
 
@@ -364,9 +379,6 @@ static bool apply_blocks(Boundary *boundary, const BoundaryJob *job, const Passe
 
 bool boundary_apply(Boundary *boundary, Rows *rows, const RowsJob *build, Err *err) {
     const Particles *particles = build->particles;
-    if (build->standing != NULL && !rows_reserve_standing(rows, particles, err))
-        return false;
-    rows->beside = build->standing != NULL ? rows->standing.data : NULL;
     const BoundaryJob job = {.sets = {&boundary->fixed.sorted, &boundary->moving.sorted},
                              .position = (const Float4 *)particles->position,
                              .centres = (const Float4 *)boundary->centres,
@@ -377,17 +389,14 @@ bool boundary_apply(Boundary *boundary, Rows *rows, const RowsJob *build, Err *e
                              .density = rows->density.data,
                              .gradient_sum = rows->gradient_sum.data,
                              .neighbours = rows->neighbours,
-                             .shape = {rows->shape[0].data, rows->shape[1].data},
-                             .standing = build->standing,
-                             .volume = build->volume,
-                             .beside = rows->standing.data};
+                             .shape = {rows->shape[0].data, rows->shape[1].data}};
     uint32_t fault;
     if (!apply_blocks(boundary, &job, build->passes, rows, build->threads, &fault))
         return err_set(
             err, ERR_DIVERGED,
-            "particle %llu touches more than %d walls and bodies at once, or has more than %d neighbours that "
-            "stand still, or more than %d samples and such neighbours lie around it",
-            (unsigned long long)particles->id[fault], MAX_CONTACT_OBJECTS, MAX_NEIGHBOURS, MAX_NEAR_SAMPLES);
+            "particle %llu touches more than %d walls and bodies at once, or more than %d of their "
+            "samples lie around it",
+            (unsigned long long)particles->id[fault], MAX_CONTACT_OBJECTS, MAX_NEAR_SAMPLES);
     if (boundary->contact_count <= boundary->contact_capacity)
         return true;
     /* the terms are done, only the list was too short: make room and list the contacts alone once more */

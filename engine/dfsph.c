@@ -426,12 +426,12 @@ static bool all_held(const uint8_t *held, uint32_t block) {
 
 /* What standing water does to a block's velocities. */
 static void push_block(Dfsph *dfsph, const DfsphProblem *problem, uint32_t block) {
-    const Standing *beside = problem->rows->beside;
+    const Float4 *push = (const Float4 *)problem->rows->beside.push;
     const Float4 *velocity = (const Float4 *)problem->particles->velocity;
     const float scale = -1.0f / problem->params->time_step;
     for (uint32_t i = block * BLOCK; i < (block + 1) * BLOCK; i++)
         for (int k = 0; k < 3; k++)
-            dfsph->spare[i][k] = velocity[i][k] + scale * beside[i].push[k];
+            dfsph->spare[i][k] = velocity[i][k] + scale * push[i][k];
 }
 
 /* What a solve begins with. */
@@ -661,8 +661,8 @@ SolveResult dfsph_solve(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kin
     dfsph->carried =
         kind == SOLVE_DENSITY && !problem->density_alone ? problem->particles->pressure_divergence : NULL;
     /* the divergence solve mends what moves, and standing water's pressure is no part of that */
-    dfsph->base =
-        kind == SOLVE_DENSITY && problem->rows->beside != NULL ? dfsph->spare : problem->particles->velocity;
+    dfsph->base = kind == SOLVE_DENSITY && problem->rows->beside.push != NULL ? dfsph->spare
+                                                                              : problem->particles->velocity;
     for (int k = 0; k < 3; k++)
         dfsph->push[k] = first ? problem->params->time_step * problem->params->gravity[k] : 0.0f;
     if (dfsph->moving)

@@ -50,20 +50,6 @@ bool grid_layout(CellGrid *cells, const GridBounds *bounds, float cell_size, int
     return total <= GRID_MAX_CELLS;
 }
 
-void grid_mark_occupied(const CellGrid *grid, uint8_t *occupied) {
-    memset(occupied, 0, cell_grid_count(grid));
-    for (int32_t x = 1; x + 1 < grid->size[0]; x++)
-        for (int32_t z = 1; z + 1 < grid->size[2]; z++)
-            for (int32_t y = 1; y + 1 < grid->size[1]; y++) {
-                const int32_t cell = cell_grid_index(grid, x, y, z);
-                if (grid->start[cell] == grid->start[cell + 1])
-                    continue;
-                for (int32_t dx = -1; dx <= 1; dx++)
-                    for (int32_t dz = -1; dz <= 1; dz++)
-                        memset(occupied + cell_grid_index(grid, x + dx, y - 1, z + dz), 1, 3);
-            }
-}
-
 static bool inside(const float *p, const GridBounds *domain) {
     for (int k = 0; k < 3; k++)
         if (!(p[k] >= domain->min[k] && p[k] <= domain->max[k]))

@@ -38,8 +38,6 @@ void grid_free(Grid *grid);
 /* Cell table over given bounds: origin and size set, one empty layer around (`margin` layers). False when it
  * would have more than GRID_MAX_CELLS. */
 bool grid_layout(CellGrid *cells, const GridBounds *bounds, float cell_size, int margin);
-/* occupied[cell]: 1 where any of the 27 cells around holds something. The outermost cells hold nothing. */
-void grid_mark_occupied(const CellGrid *grid, uint8_t *occupied);
 
 /* m */
 static inline float grid_centre(const CellGrid *cells, int axis) {

@@ -265,7 +265,7 @@ static void part_force(const SkiffSim *sim, const BoundarySet *set, const uint8_
             const double d[3] = {(double)p[0] - at[0], (double)p[1] - at[1], (double)p[2] - at[2]};
             const double r = sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
             const double factor =
-                weight * (double)set->sorted.value[s] * kernel_gradient_factor(&sim->kernel, r);
+                weight * (double)set->sorted.volume[s] * kernel_gradient_factor(&sim->kernel, r);
             const double f[3] = {factor * d[0], factor * d[1], factor * d[2]};
             const double arm[3] = {at[0] - (double)centre[0], at[1] - (double)centre[1],
                                    at[2] - (double)centre[2]};

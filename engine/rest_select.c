@@ -79,14 +79,15 @@ static void add_solids(Select *select) {
 static const float HALF_SPACE = 0.5f;
 
 static void find_candidates(Select *select) {
-    const Standing *existing = select->cloud->rows.beside;
+    const Standing *existing = &select->cloud->rows.beside;
+    const bool exists = existing->push != NULL;
     EACH_POINT {
         const RestKind kind = kind_of(select, i);
         select->state[i] = PASSIVE;
         if (kind != REST_FLUID && kind != REST_AIR)
             continue;
-        const float share = existing != NULL ? existing[i].share : 0.0f;
-        const bool touches = existing != NULL && existing[i].touching > 0.0f;
+        const float share = exists ? existing->push[i][3] : 0.0f;
+        const bool touches = exists && existing->apart[i][3] > 0.0f;
         const bool taken = kind == REST_AIR && share > HALF_SPACE;
         select->constant[i] += share;
         if (touches || taken || select->constant[i] > select->params->rest_max_constant)

@@ -353,7 +353,7 @@ static void correct_held(Settle *settle) {
  * pressure itself pushes pairs together. */
 static void part_pairs(const Settle *settle) {
     Particles *particles = settle->particles;
-    const Standing *beside = settle->rows->beside;
+    const Float4 *apart_from = (const Float4 *)settle->rows->beside.apart;
     const float r = settle->params.particle_radius, share = PART_SHARE / settle->params.time_step;
     const int32_t close = (int32_t)(32767.0f * (1.0f - 6.0f / 16.0f * (1.0f - 1.0f / 4.0f))); /* q = 1/4 */
 #pragma omp parallel for schedule(static, BLOCK) num_threads(settle->sim->threads)
@@ -361,8 +361,8 @@ static void part_pairs(const Settle *settle) {
         RestNeighbour row[MAX_NEIGHBOURS];
         if (settle->held != NULL && settle->held[i])
             continue;
-        for (int k = 0; beside != NULL && k < 3; k++)
-            particles->velocity[i][k] += share * beside[i].apart[k];
+        for (int k = 0; apart_from != NULL && k < 3; k++)
+            particles->velocity[i][k] += share * apart_from[i][k];
         const int length = rest_row(&settle->rows->pairs, i, row);
         for (int n = 0; n < length; n++) {
             if (row[n].weight <= close)

@@ -17,22 +17,22 @@ typedef struct Rows {
     PairData pairs;
     PairData
         corrected; /* the same pairs with gradients that are right for linear fields, after rows_correct */
-    uint16_t *neighbours;   /* [particles] fluid and boundary */
-    const Standing *beside; /* NULL, or [particles] what RowsJob.standing gives them */
+    uint16_t *neighbours; /* [particles] fluid and boundary */
+    Standing beside;      /* what RowsJob.standing gives them; without it NULL */
     bool wide;
     /* pool of row entries: threads take chunks, slices take from their thread's chunk */
     Buffer pool, weights, slices, density, gradient_sum, neighbour_counts;
     uint32_t pool_entries;
     atomic_uint pool_used;
     RowShare shares[ROWS_MAX_THREADS];
-    Buffer gradients, corrected_sum, shape[2], standing;
+    Buffer gradients, corrected_sum, shape[2], push, apart;
     Buffer scratch; /* Scratch of every thread */
 } Rows;
 
 /* Neighbours, densities (fluid part) and gradient sums (fluid part, fixed-point units) of the sorted
  * particles. Grows the pool when it is too small, and turns to wide entries when offsets do not fit: both
  * happen in the first steps or never. `frozen` (NULL: none) marks particles that others see but that get no
- * row; `standing` (NULL: none) is more water that stands still, which boundary_apply adds. */
+ * row; `standing` (NULL: none) is more water that does not move. */
 typedef struct RowsJob {
     const Passes *passes;
     const Grid *grid;
@@ -40,12 +40,10 @@ typedef struct RowsJob {
     const Kernel *kernel;
     float volume;          /* m^3, of a particle */
     const uint8_t *frozen; /* [particles] or NULL */
-    const SampleSet *standing;
+    const StandingSet *standing;
     int threads;
 } RowsJob;
 bool rows_build(Rows *rows, const RowsJob *job, Err *err);
-/* Room for `beside`. */
-bool rows_reserve_standing(Rows *rows, const Particles *particles, Err *err);
 /* Room for `shape`, the moments that boundary_apply adds for rows_correct. */
 bool rows_reserve_correction(Rows *rows, const Particles *particles, Err *err);
 /* Makes `corrected` from rows that are complete, boundary and all. */

@@ -21,28 +21,27 @@ void standing_add(StandingWater *water, const float position[3], float pressure)
 }
 
 void standing_scale(StandingWater *water, float factor) {
-    float *value = (float *)water->set.value;
+    Float4 *sorted = (Float4 *)water->set.points;
     for (uint32_t i = 0; i < water->count; i++) {
         water->points[i][3] *= factor;
-        value[i] *= factor;
+        sorted[i][3] *= factor;
     }
 }
 
 static bool reserve_sorted(StandingWater *water, Err *err) {
     const size_t cells = cell_grid_count(&water->set.grid), padded = water->count + (size_t)SLICE;
-    if (!buffer_reserve(&water->sorted, "standing water by cell", 4 * padded * sizeof(float), err) ||
+    if (!buffer_reserve(&water->sorted, "standing water by cell",
+                        padded * (sizeof(Float4) + 3 * sizeof(float)), err) ||
         !buffer_reserve(&water->cells, "cells of standing water", water->count * sizeof(uint32_t), err) ||
-        !buffer_reserve(&water->start, "cell starts of standing water", (cells + 2) * sizeof(uint32_t),
-                        err) ||
-        !buffer_reserve(&water->occupied, "cells near standing water", cells, err))
+        !buffer_reserve(&water->start, "cell starts of standing water", (cells + 2) * sizeof(uint32_t), err))
         return false;
-    float *sorted = water->sorted.data;
-    water->set.x = sorted;
-    water->set.y = sorted + padded;
-    water->set.z = sorted + 2 * padded;
-    water->set.value = sorted + 3 * padded;
+    Float4 *points = water->sorted.data;
+    float *x = (float *)(points + padded);
+    water->set.points = (const Float4 *)points;
+    water->set.x = x;
+    water->set.y = x + padded;
+    water->set.z = x + 2 * padded;
     water->set.grid.start = water->start.data;
-    water->set.occupied = water->occupied.data;
     return true;
 }
 
@@ -61,13 +60,13 @@ static bool lay_out(StandingWater *water, float cell_size, Err *err) {
 }
 
 bool standing_sort(StandingWater *water, float cell_size, Err *err) {
-    SampleSet *set = &water->set;
+    StandingSet *set = &water->set;
     set->count = water->count;
     if (water->count == 0)
         return true;
     if (!lay_out(water, cell_size, err) || !reserve_sorted(water, err))
         return false;
-    /* start[c + 1] runs from a cell's first to its last while they are dealt out */
+    /* start[c + 1] runs from a cell's first point to the next cell's while they are dealt out */
     uint32_t *start = water->start.data, *cell = water->cells.data;
     const size_t cells = cell_grid_count(&set->grid);
     memset(start, 0, (cells + 2) * sizeof(uint32_t));
@@ -77,15 +76,15 @@ bool standing_sort(StandingWater *water, float cell_size, Err *err) {
     }
     for (size_t c = 0; c < cells; c++)
         start[c + 2] += start[c + 1];
-    float *x = (float *)set->x, *y = (float *)set->y, *z = (float *)set->z, *value = (float *)set->value;
+    float *x = (float *)set->x, *y = (float *)set->y, *z = (float *)set->z;
+    Float4 *points = (Float4 *)set->points;
     for (uint32_t i = 0; i < water->count; i++) {
         const uint32_t to = start[cell[i] + 1]++;
         x[to] = water->points[i][0];
         y[to] = water->points[i][1];
         z[to] = water->points[i][2];
-        value[to] = water->points[i][3];
+        memcpy(points[to], water->points[i], sizeof points[to]);
     }
-    grid_mark_occupied(&set->grid, water->occupied.data);
     return true;
 }
 
@@ -94,6 +93,5 @@ void standing_free(StandingWater *water) {
     buffer_free(&water->sorted);
     buffer_free(&water->cells);
     buffer_free(&water->start);
-    buffer_free(&water->occupied);
     *water = (StandingWater){0};
 }

@@ -1,5 +1,6 @@
 /* Water that stands still while other water settles beside it: what exists already, and what is at rest as it
- * was laid. It is sorted once, and gives every step what it has to give (passes.h, Standing). */
+ * was laid. It is sorted once, and gives every step what it has to give (StandingSet, Standing in passes.h).
+ */
 #ifndef SKIFF_STANDING_H
 #define SKIFF_STANDING_H
 
@@ -7,9 +8,9 @@
 
 typedef struct StandingWater {
     uint32_t count, capacity;
-    Float4 *points; /* [count] window-local, m; [3]: P, m^2 */
-    SampleSet set;  /* the same by cell, after standing_sort */
-    Buffer point_buffer, sorted, cells, start, occupied;
+    Float4 *points;  /* [count] window-local, m; [3]: P, m^2 */
+    StandingSet set; /* the same by cell, after standing_sort */
+    Buffer point_buffer, sorted, cells, start;
 } StandingWater;
 
 /* Room for `capacity` points in all. */
