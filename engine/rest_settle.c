@@ -4,16 +4,16 @@
  * own, but not calming: what settles is all disorder, and losing it every step means creeping to its place
  * where it could fall. Bodies are held. Errors are means over the active particles.
  *
- * restSettle candidates, the paper's way: in the cloud, with rows for the candidates and what stands beside
- * them. All other points stand still and keep the pressure that still water has at their place: for the solve
- * it is a boundary condition, so what is active settles under the load it will carry, and pressures of points
+ * restSettle candidates, the paper's way: in the cloud, which then holds the candidates alone. All other
+ * points stand still (standing.h) and keep the pressure that still water has at their place: for the solve it
+ * is a boundary condition, so what is active settles under the load it will carry, and pressures of points
  * that cannot move do not pile up.
  *
  * restSettle all: in the simulation itself, all new water. A thin layer between walls and water that cannot
  * yield ends crowded or starved wherever the selection took one point too few or too many, and so the first
  * free steps move everything; and a cut through water at rest is no free surface at rest. Existing water
- * stands still here too. Beside the new it begins with the pressure of still water and then, where the new
- * water crowds it, presses harder until it is not.
+ * stands still here too. It begins with the pressures it has and then, where the new water crowds it, presses
+ * harder until it is not.
  *
  * restSettle shell: most of the way is that of the layer, all of it is needed only for the last, small one.
  * First the cloud as with candidates, but twice as thick a layer; then a few steps of everything. */
@@ -656,10 +656,10 @@ void rest_cloud_free(RestCloud *cloud) {
     cloud->boundary.fixed = cloud->boundary.moving = (BoundarySet){0};
     boundary_free(&cloud->boundary);
     dfsph_free(&cloud->dfsph);
-    Buffer *buffers[] = {&cloud->marks,    &cloud->clearance, &cloud->laid,     &cloud->source,
-                         &cloud->fate,     &cloud->frozen,    &cloud->held,     &cloud->state,
-                         &cloud->constant, &cloud->walls,     &cloud->sum,      &cloud->density,
-                         &cloud->order,    &cloud->whence[0], &cloud->whence[1]};
+    Buffer *buffers[] = {&cloud->tallies, &cloud->marks,    &cloud->clearance, &cloud->laid,
+                         &cloud->source,  &cloud->fate,     &cloud->frozen,    &cloud->held,
+                         &cloud->state,   &cloud->constant, &cloud->walls,     &cloud->sum,
+                         &cloud->density, &cloud->order,    &cloud->whence[0], &cloud->whence[1]};
     for (size_t b = 0; b < sizeof buffers / sizeof *buffers; b++)
         buffer_free(buffers[b]);
     for (int f = 0; f <= PARTICLE_FIELD_COUNT; f++)
