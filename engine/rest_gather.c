@@ -324,7 +324,7 @@ bool rest_gather(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err
     /* water that fits the walls has a true surface, no air over it */
     cloud->fits_walls = request->fitted != NULL;
     cloud->counted_below = request->fitted != NULL ? request->surface - sim->kernel.support : INFINITY;
-    uint32_t laid;
+    uint32_t laid = 0;
     if (!make_cells(&gather, err) || !lay_points(&gather, &laid, err))
         return false;
     if (!buffer_reserve(&cloud->tallies, "tallies of points", (laid / TALLY + 1) * sizeof(Tally), err))
