@@ -25,10 +25,10 @@
 static const double FIRST_ALPHA = 0.8, LAST_ALPHA = 0.1;
 /* Longest step, r / sqrt(p / rho0): beyond 1.5 it is unstable, whatever depth and radius. */
 static const float LONGEST = 1.35f;
-/* Of the tolerance asked for. The solves of moving water stop when the two-sided error is 0.6 of a tolerance;
- * as the paper does it the one-sided error, half of that, may be all of it; and whatever the last steps leave
- * moves the first free ones. */
-static const float PAPER_ERRORS = 3.3f, LAYER_ERRORS = 1.0f, LAST_ERRORS = 0.5f;
+/* The solves of moving water stop when the two-sided error is 0.6 of a tolerance. In a layer that is let go
+ * only after more steps it may be all of the tolerance, as the paper does it the one-sided error, half of
+ * that; whatever the last steps leave moves the first free ones. */
+static const float PAPER_ERRORS = 3.3f, LAYER_ERRORS = 1.6f, LAST_ERRORS = 0.5f;
 /* Of a density error of held water, the share that a step turns into pressure: with 1 its pressures swing. */
 static const float HELD_SHARE = 0.15f;
 /* Of what two particles lack to the distance of a radius, the share that each moves a step. */
