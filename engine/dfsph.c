@@ -206,10 +206,10 @@ static void divergence_block(const Dfsph *dfsph, const DfsphProblem *problem, co
         subtract_bodies(problem->boundary, velocities, result, block);
 }
 
-/* result = velocity + push - D^T p / dt, p the operand's; the bodies' share stays in `response`. */
+/* result = velocity + push - D^T p / dt, p the operand's and standing water's; the bodies' share stays in
+ * `response`. */
 static void apply_pressure(Dfsph *dfsph, const DfsphProblem *problem, Float4 *result) {
-    apply_transpose(dfsph, problem, (const Float4 *)problem->particles->velocity,
-                    -1.0f / problem->params->time_step, result);
+    apply_transpose(dfsph, problem, dfsph->base, -1.0f / problem->params->time_step, result);
 }
 
 /* Velocities of the bodies after the pressure so far. */
@@ -431,6 +431,16 @@ static bool all_held(const uint8_t *held, uint32_t block) {
     return held != NULL;
 }
 
+/* What standing water does to a block's velocities. */
+static void push_block(Dfsph *dfsph, const DfsphProblem *problem, uint32_t block) {
+    const Float4 *push = (const Float4 *)problem->rows->beside.push;
+    const Float4 *velocity = (const Float4 *)problem->particles->velocity;
+    const float scale = -1.0f / problem->params->time_step;
+    for (uint32_t i = block * BLOCK; i < (block + 1) * BLOCK; i++)
+        for (int k = 0; k < 3; k++)
+            dfsph->spare[i][k] = velocity[i][k] + scale * push[i][k];
+}
+
 /* What a solve begins with. */
 static void prepare(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, float *p) {
     const uint32_t blocks = particles_blocks(problem->particles);
@@ -442,6 +452,8 @@ static void prepare(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, f
         memset(dfsph->direction + begin, 0, BLOCK * sizeof(float));
         memset(dfsph->image + begin, 0, BLOCK * sizeof(float));
         memcpy(dfsph->operand + begin, problem->particles->position + begin, BLOCK * sizeof(Float4));
+        if (dfsph->base == dfsph->spare)
+            push_block(dfsph, problem, block);
         if (dfsph->shifting)
             lower_block(dfsph, problem->particles->pressure, block);
         EACH_SLICE {
@@ -655,6 +667,9 @@ SolveResult dfsph_solve(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kin
     dfsph->shifting = kind == SOLVE_SHIFT;
     dfsph->carried =
         kind == SOLVE_DENSITY && !problem->density_alone ? problem->particles->pressure_divergence : NULL;
+    /* the divergence solve mends what moves, and standing water's pressure is no part of that */
+    dfsph->base = kind == SOLVE_DENSITY && problem->rows->beside.push != NULL ? dfsph->spare
+                                                                              : problem->particles->velocity;
     for (int k = 0; k < 3; k++)
         dfsph->push[k] = first ? problem->params->time_step * problem->params->gravity[k] : 0.0f;
     if (dfsph->moving)

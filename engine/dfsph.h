@@ -33,7 +33,9 @@ typedef struct Dfsph {
     float *lower;          /* [particles] least value of the unknown in a shift; one slice of zeros else */
     uint8_t *still;        /* [blocks] 1: all of it is held, and its vectors are zero during a solve */
     const float *carried;  /* NULL, or [particles] pressure that acts beside the unknown */
-    float push[3];         /* m/s, of gravity: acts beside the pressures */
+    const Float4
+        *base; /* velocities before the pressures: the particles', or, pushed by standing water, in spare */
+    float push[3]; /* m/s, of gravity: acts beside the pressures */
     bool shifting;
     bool moving;           /* any object has a velocity or may get one */
     bool answering;        /* and bodies answer pressure */

@@ -81,6 +81,7 @@ void forces_apply_fluid(const DfsphProblem *problem, Dfsph *dfsph) {
                           .calming = params->calming,
                           .calming_limit = dt * params->calming_limit,
                           .strain = {(const Float4 *)dfsph->answer, (const Float4 *)dfsph->spare}};
+    const Float4 *push = (const Float4 *)problem->rows->beside.push; /* standing water rubs, too */
     const uint32_t blocks = particles_blocks(particles);
 #pragma omp parallel num_threads(problem->threads)
     {
@@ -92,6 +93,10 @@ void forces_apply_fluid(const DfsphProblem *problem, Dfsph *dfsph) {
 #pragma omp for schedule(dynamic, DFSPH_CHUNK)
         for (uint32_t block = 0; block < blocks; block++)
             problem->passes->forces(&job, block);
+#pragma omp for schedule(static)
+        for (uint32_t i = 0; i < (push != NULL ? particles->count : 0); i++)
+            for (int k = 0; k < 3; k++)
+                job.result[i][k] -= params->viscosity * push[i][3] * particles->velocity[i][k];
 #pragma omp for schedule(static)
         for (uint32_t i = 0; i < (problem->held != NULL ? particles->count : 0); i++)
             if (problem->held[i])

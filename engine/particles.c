@@ -108,19 +108,32 @@ void particles_remove(Particles *particles, const uint32_t *gone, uint32_t gone_
     particles->count = kept;
 }
 
-uint32_t particles_append(Particles *particles, const float position[3], const float velocity[3],
-                          double birth) {
-    assert(particles->count < particles->capacity);
-    const uint32_t i = particles->count++;
+uint32_t particles_extend(Particles *particles, uint32_t count) {
+    assert(count <= particles->capacity - particles->count);
+    const uint32_t first = particles->count;
+    particles->count += count;
+    particles->next_id += count;
+    return first;
+}
+
+void particles_put(Particles *particles, uint32_t i, uint64_t id, const float position[3],
+                   const float velocity[3], double birth) {
     for (int k = 0; k < 3; k++) {
         particles->position[i][k] = position[k];
         particles->velocity[i][k] = velocity[k];
     }
     particles->position[i][3] = particles->velocity[i][3] = 0.0f;
     particles->pressure[i] = particles->pressure_divergence[i] = particles->prediction[i] = 0.0f;
-    particles->id[i] = particles->next_id++;
+    particles->id[i] = id;
     particles->birth[i] = birth;
     particles->row_size[i] = 0;
     particles->edge[i] = EDGE_NONE;
+}
+
+uint32_t particles_append(Particles *particles, const float position[3], const float velocity[3],
+                          double birth) {
+    const uint64_t id = particles->next_id;
+    const uint32_t i = particles_extend(particles, 1);
+    particles_put(particles, i, id, position, velocity, birth);
     return i;
 }

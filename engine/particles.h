@@ -60,6 +60,12 @@ void particles_remove(Particles *particles, const uint32_t *gone, uint32_t gone_
 uint32_t particles_append(Particles *particles, const float position[3], const float velocity[3],
                           double birth);
 
+/* The same for many: room for `count` at the end, which takes as many ids; returns the first index. Then each
+ * is put there, by any thread. */
+uint32_t particles_extend(Particles *particles, uint32_t count);
+void particles_put(Particles *particles, uint32_t i, uint64_t id, const float position[3],
+                   const float velocity[3], double birth);
+
 /* Blocks of BLOCK particles that cover the fluid. */
 static inline uint32_t particles_blocks(const Particles *particles) {
     return (particles->count + BLOCK - 1) / BLOCK;

@@ -66,6 +66,22 @@ typedef struct SampleSet {
     uint32_t count;
 } SampleSet;
 
+/* Water that stands still beside what the search is for, sorted by cell. To the solves it is a wall that
+ * presses: it needs no rows, and no iteration visits it. */
+typedef struct StandingSet {
+    CellGrid grid;
+    const float *x, *y, *z; /* m; padded by a slice */
+    const Float4 *points;   /* the same; [3]: P, m^2 */
+    uint32_t count;
+} StandingSet;
+
+/* What it gives the particles. */
+typedef struct Standing {
+    Float4 *push;  /* [particles] sum P V grad W, m; [3]: sum V W, its part of the density */
+    Float4 *apart; /* [particles] sum of r - d along the line to the particle, over its points at a distance d
+                    * below r = h / 4, m; [3]: how many are nearer than r / 2 */
+} Standing;
+
 /* Samples near one cell. */
 typedef struct NearSamples {
     int32_t cell; /* -1: none yet */
@@ -75,14 +91,23 @@ typedef struct NearSamples {
     int32_t object[MAX_NEAR_SAMPLES + LANES];
 } NearSamples;
 
+/* Who may be near a cell's particles. */
+typedef struct Candidates {
+    float x[MAX_CANDIDATES + LANES], y[MAX_CANDIDATES + LANES], z[MAX_CANDIDATES + LANES];
+    int32_t halves[MAX_CANDIDATES + LANES]; /* their indices as vf_gather4_i32 takes them */
+} Candidates;
+
 /* Scratch of one thread; too large for the stack. */
 typedef struct Scratch {
-    float x[MAX_CANDIDATES + LANES], y[MAX_CANDIDATES + LANES], z[MAX_CANDIDATES + LANES];
-    int32_t halves[MAX_CANDIDATES + LANES]; /* candidates as vf_gather4_i32 takes them */
+    Candidates candidates, standing;
     /* neighbours of a group's particles, the near ones and in the end all; the far ones; where each begins */
     int32_t lists[ROW_GROUP * (MAX_NEIGHBOURS + LANES) + 3 * LANES],
         far[ROW_GROUP * MAX_NEIGHBOURS + 3 * LANES];
     uint32_t list_start[ROW_GROUP], far_start[ROW_GROUP];
+    /* their neighbours among standing water, and where each particle's end and begin */
+    int32_t standing_lists[ROW_GROUP * (MAX_NEIGHBOURS + LANES) + 3 * LANES];
+    uint32_t standing_start[ROW_GROUP];
+    int32_t standing_count[ROW_GROUP];
     NearSamples near[2]; /* walls, bodies */
     Contact contacts[BLOCK * MAX_CONTACT_OBJECTS];
 } Scratch;
@@ -164,7 +189,9 @@ typedef struct SearchJob {
     float *density;
     Float4 *gradient_sum; /* sum_j V grad W_ij, 1/m; [3]: sum of their squares */
     uint16_t *neighbours;
-    uint32_t *row_size; /* see particles.inl */
+    uint32_t *row_size;          /* see particles.inl */
+    const StandingSet *standing; /* NULL, or more water around, which gives: */
+    Standing beside;
     RowAllocate *allocate;
     void *rows;
 } SearchJob;

@@ -9,6 +9,7 @@
 #define SKIFF_REST_H
 
 #include "dfsph.h"
+#include "standing.h"
 #include "tile.h"
 
 /* What a point of the cloud is. FLUID and AIR may feel a solid or existing water; SUPPORT and SUPPORT_AIR
@@ -18,10 +19,8 @@ typedef enum RestKind {
     REST_AIR,
     REST_SUPPORT,
     REST_SUPPORT_AIR,
-    REST_EXISTING,
     REST_ACTIVE,
-    REST_RIM,
-    REST_EXISTING_RIM /* the same of existing water */
+    REST_RIM /* stands still beside what is active */
 } RestKind;
 
 /* Values of the params rest_rule, rest_protector and rest_schedule. */
@@ -59,16 +58,16 @@ typedef struct RestRequest {
 
 /* The points of a fill and what the stages need. Kept from fill to fill for its memory. */
 typedef struct RestCloud {
-    Particles points; /* id: RestKind in the upper half */
+    Particles points;       /* new ones; id: RestKind in the upper half */
+    StandingWater standing; /* existing water that they can feel; then also new water beside what settles */
     Grid grid;
     Rows rows;
     Boundary boundary; /* the simulation's samples with contacts of the cloud's own */
     Dfsph dfsph;
     bool fits_walls;     /* the points fit the walls: these make no candidates and remove nothing */
-    bool has_existing;   /* existing water is among the points */
     float counted_below; /* y: candidates above lack neighbours and do not count in the mean density */
-    Buffer marks, clearance, laid, source, fate; /* rest_gather.c */
-    Buffer frozen, held;                         /* [points] 1: gets no row; gets one but does not move */
+    Buffer marks, clearance, laid, source, fate, tallies; /* rest_gather.c */
+    Buffer frozen, held; /* [points] 1: gets no row; [particles of the simulation] 1: does not move */
     Buffer state, constant, walls, sum, density, order; /* rest_select.c */
     Buffer kept[PARTICLE_FIELD_COUNT + 1];              /* existing water as it was, and its densities */
     Buffer whence[2];                                   /* where existing water stands in `kept` */
@@ -90,8 +89,8 @@ bool rest_settle(struct SkiffSim *sim, const RestRequest *request, SkiffFill *fi
 /* The simulation's particles are a column of water, x and z in [0, period), that goes on periodically: all
  * but the edge settles. */
 bool rest_settle_column(struct SkiffSim *sim, double period, SkiffFill *fill, Err *err);
-/* Sorts the cloud, freezes what is of no kind in `evaluated` (bits 1 << RestKind), and makes rows and
- * boundary terms of the rest. */
+/* Sorts the cloud, and makes rows and boundary terms of the kinds in `evaluated` (bits 1 << RestKind); the
+ * others are only seen by these. */
 bool rest_search(struct SkiffSim *sim, uint32_t evaluated, Err *err);
 typedef struct RestNeighbour {
     uint32_t index;

@@ -230,32 +230,91 @@ static void first_pressure(const Gather *gather, const float p[3], uint32_t sour
     }
 }
 
-static void append(const Gather *gather, Particles *points, uint32_t i, uint64_t id, double birth) {
+static void put(const Gather *gather, Particles *points, uint32_t to, uint32_t i, uint64_t id, double birth) {
     const float *p = ((const float(*)[3])gather->sim->rest.laid.data)[i];
-    const uint32_t to = particles_append(points, p, (const float[3]){0}, birth);
     float pressure[2];
+    particles_put(points, to, id, p, (const float[3]){0}, birth);
     first_pressure(gather, p, ((const uint32_t *)gather->sim->rest.source.data)[i], pressure);
     points->pressure[to] = pressure[0];
     points->pressure_divergence[to] = pressure[1];
-    points->id[to] = id;
 }
 
-/* Existing water that the cloud's points can feel. It presses as still water does: its own pressures are
- * those of one step, and swing by their own size from step to step. */
-static void add_existing(Gather *gather) {
+/* Existing water that the points which may settle can feel. It presses as still water does: its own pressures
+ * are those of one step, and swing by their own size from step to step. */
+static void add_existing(Gather *gather, uint32_t count) {
     SkiffSim *sim = gather->sim;
-    Particles *points = &sim->rest.points;
-    memset(gather->marks, 0, gather->cell_count);
-    mark_points(gather, points->position[0], points->count, NEAR);
-    dilate(gather, NEAR, AROUND);
+    const Particles *points = &sim->rest.points;
     size_t cell;
-    for (uint32_t i = 0; i < sim->particles.count; i++) {
+    memset(gather->marks, 0, gather->cell_count);
+    for (uint32_t i = 0; i < points->count; i++) {
+        const RestKind kind = rest_kind(points->id[i]);
+        if ((kind == REST_FLUID || kind == REST_AIR) && cell_of(&gather->cells, points->position[i], &cell))
+            gather->marks[cell] |= NEAR;
+    }
+    dilate(gather, NEAR, AROUND);
+    for (uint32_t i = 0; i < count; i++) {
         const float *p = sim->particles.position[i];
-        if (!cell_of(&gather->cells, p, &cell) || !(gather->marks[cell] & AROUND))
-            continue;
-        const uint32_t to = particles_append(points, p, sim->particles.velocity[i], 0.0);
-        points->id[to] = rest_id(REST_EXISTING, i);
-        points->pressure[to] = still_pressure(gather, p);
+        if (cell_of(&gather->cells, p, &cell) && gather->marks[cell] & AROUND)
+            standing_add(&sim->rest.standing, p, still_pressure(gather, p));
+    }
+}
+
+/* How many of some points go where. */
+typedef struct Tally {
+    uint32_t near, bulk,
+        water; /* to the cloud, to the simulation; to the simulation in the end, by the cloud */
+} Tally;
+
+enum { TALLY = 4096 }; /* points that are counted together, so that threads know where theirs begin */
+
+/* Fates of all points. Leaves in `tallies` how many come before each part; returns how many there are. */
+static Tally decide(const Gather *gather, uint32_t laid) {
+    RestCloud *cloud = &gather->sim->rest;
+    const float(*laid_at)[3] = cloud->laid.data;
+    uint8_t *fate = cloud->fate.data;
+    Tally *tallies = cloud->tallies.data, all = {0};
+#pragma omp parallel for schedule(dynamic, 1) num_threads(gather->sim->threads)
+    for (uint32_t part = 0; part <= laid / TALLY; part++) {
+        Tally tally = {0};
+        for (uint32_t i = part * TALLY; i < laid && i < (part + 1) * TALLY; i++) {
+            fate[i] = fate_of(gather, laid_at[i]);
+            tally.bulk += fate[i] == BULK;
+            tally.near += fate[i] >= IN_CLOUD;
+            tally.water += fate[i] == IN_CLOUD + REST_FLUID || fate[i] == IN_CLOUD + REST_SUPPORT;
+        }
+        tallies[part] = tally;
+    }
+    for (uint32_t part = 0; part <= laid / TALLY; part++) {
+        const Tally tally = tallies[part];
+        tallies[part] = all;
+        all.near += tally.near;
+        all.bulk += tally.bulk;
+        all.water += tally.water;
+    }
+    return all;
+}
+
+/* Puts all points in their order where their fates say. */
+static void deal(const Gather *gather, uint32_t laid, const Tally *all) {
+    SkiffSim *sim = gather->sim;
+    const uint8_t *fate = sim->rest.fate.data;
+    const Tally *tallies = sim->rest.tallies.data;
+    const uint64_t first_id = sim->particles.next_id;
+    const uint32_t near = particles_extend(&sim->rest.points, all->near);
+    const uint32_t bulk = particles_extend(&sim->particles, all->bulk);
+#pragma omp parallel for schedule(dynamic, 1) num_threads(sim->threads)
+    for (uint32_t part = 0; part <= laid / TALLY; part++) {
+        Tally before = tallies[part];
+        for (uint32_t i = part * TALLY; i < laid && i < (part + 1) * TALLY; i++) {
+            if (fate[i] >= IN_CLOUD) {
+                const uint64_t id = rest_id((RestKind)(fate[i] - IN_CLOUD), before.near);
+                put(gather, &sim->rest.points, near + before.near++, i, id, 0.0);
+            } else if (fate[i] == BULK) {
+                put(gather, &sim->particles, bulk + before.bulk, i, first_id + before.bulk,
+                    gather->request->birth);
+                before.bulk++;
+            }
+        }
     }
 }
 
@@ -265,38 +324,24 @@ bool rest_gather(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err
     /* water that fits the walls has a true surface, no air over it */
     cloud->fits_walls = request->fitted != NULL;
     cloud->counted_below = request->fitted != NULL ? request->surface - sim->kernel.support : INFINITY;
-    uint32_t laid;
+    uint32_t laid = 0;
     if (!make_cells(&gather, err) || !lay_points(&gather, &laid, err))
         return false;
-    uint8_t *fate = cloud->fate.data;
-    const float(*laid_at)[3] = cloud->laid.data;
-    uint32_t bulk = 0, near = 0, water = 0;
-#pragma omp parallel for schedule(dynamic, 4096) num_threads(sim->threads) reduction(+ : bulk, near, water)
-    for (uint32_t i = 0; i < laid; i++) {
-        fate[i] = fate_of(&gather, laid_at[i]);
-        bulk += fate[i] == BULK;
-        near += fate[i] >= IN_CLOUD;
-        water += fate[i] == IN_CLOUD + REST_FLUID || fate[i] == IN_CLOUD + REST_SUPPORT;
-    }
-    /* the cloud, in its order; then what exists around it */
-    cloud->points.count = 0;
-    fill->particles = bulk;
-    if (near == 0 && bulk == 0)
-        return true;
-    if (!particles_reserve(&cloud->points, near + sim->particles.count, err) ||
-        !buffer_reserve(&cloud->frozen, "frozen points", cloud->points.capacity + SLICE, err) ||
-        !buffer_reserve(&cloud->held, "held points", cloud->points.capacity + SLICE, err) ||
-        !sim_reserve(sim, sim->particles.count + bulk + water, err))
+    if (!buffer_reserve(&cloud->tallies, "tallies of points", (laid / TALLY + 1) * sizeof(Tally), err))
         return false;
-    for (uint32_t i = 0; i < laid; i++)
-        if (fate[i] >= IN_CLOUD)
-            append(&gather, &cloud->points, i, rest_id((RestKind)(fate[i] - IN_CLOUD), cloud->points.count),
-                   0.0);
-    cloud->has_existing = near > 0 && sim->particles.count > 0;
-    if (cloud->has_existing)
-        add_existing(&gather);
-    for (uint32_t i = 0; i < laid; i++)
-        if (fate[i] == BULK)
-            append(&gather, &sim->particles, i, sim->particles.next_id, request->birth);
-    return true;
+    const Tally all = decide(&gather, laid);
+    cloud->points.count = cloud->standing.count = 0;
+    fill->particles = all.bulk;
+    if (all.near == 0 && all.bulk == 0)
+        return true;
+    const uint32_t existing = sim->particles.count;
+    if (!particles_reserve(&cloud->points, all.near, err) ||
+        !standing_reserve(&cloud->standing, all.near + existing, err) ||
+        !buffer_reserve(&cloud->frozen, "frozen points", cloud->points.capacity + SLICE, err) ||
+        !sim_reserve(sim, existing + all.bulk + all.water, err))
+        return false;
+    deal(&gather, laid, &all);
+    if (all.near > 0 && existing > 0)
+        add_existing(&gather, existing);
+    return standing_sort(&cloud->standing, sim->kernel.support, err);
 }

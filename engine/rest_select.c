@@ -79,30 +79,18 @@ static void add_solids(Select *select) {
 static const float HALF_SPACE = 0.5f;
 
 static void find_candidates(Select *select) {
-    /* half a radius is an eighth of the support; q = 1/8 in the kernel */
-    const int32_t too_close = (int32_t)(32767.0f * (1.0f - 6.0f / 64.0f * (1.0f - 1.0f / 8.0f)));
-    const bool has_existing = select->cloud->has_existing;
-    uint8_t *exists = select->cloud->fate.data; /* not needed any more; a byte a neighbour is less to read */
-    EACH_POINT {
-        exists[i] = kind_of(select, i) == REST_EXISTING;
-    }
+    const Standing *existing = &select->cloud->rows.beside;
+    const bool exists = existing->push != NULL;
     EACH_POINT {
         const RestKind kind = kind_of(select, i);
         select->state[i] = PASSIVE;
         if (kind != REST_FLUID && kind != REST_AIR)
             continue;
-        RestNeighbour row[MAX_NEIGHBOURS];
-        int32_t existing = 0, closest = 0;
-        const int length = has_existing ? rest_row(select->pairs, i, row) : 0;
-        for (int k = 0; k < length; k++) {
-            if (!exists[row[k].index])
-                continue;
-            existing += row[k].weight;
-            closest = row[k].weight > closest ? row[k].weight : closest;
-        }
-        select->constant[i] += select->unit * (float)existing;
-        const bool taken = kind == REST_AIR && select->unit * (float)existing > HALF_SPACE;
-        if (closest > too_close || taken || select->constant[i] > select->params->rest_max_constant)
+        const float share = exists ? existing->push[i][3] : 0.0f;
+        const bool touches = exists && existing->apart[i][3] > 0.0f;
+        const bool taken = kind == REST_AIR && share > HALF_SPACE;
+        select->constant[i] += share;
+        if (touches || taken || select->constant[i] > select->params->rest_max_constant)
             select->state[i] = GONE;
         else if (kind == REST_FLUID && select->constant[i] > 0.0f)
             select->state[i] = CANDIDATE;
@@ -118,15 +106,13 @@ static void list_candidates(Select *select) {
 }
 
 static void sum_weights(Select *select) {
-    const uint8_t *exists = select->cloud->fate.data; /* find_candidates */
     EACH_CANDIDATE {
         const uint32_t i = select->candidates[k];
         RestNeighbour row[MAX_NEIGHBOURS];
         int32_t sum = 0;
         const int length = rest_row(select->pairs, i, row);
         for (int n = 0; n < length; n++) {
-            const uint32_t j = row[n].index;
-            if (select->state[j] != GONE && !exists[j])
+            if (select->state[row[n].index] != GONE)
                 sum += row[n].weight;
         }
         select->sum[i] = sum;
@@ -310,9 +296,7 @@ static void mark_rim(Select *select) {
         const RestKind kind = rest_kind(id[i]);
         if (!touched[i])
             continue;
-        if (kind == REST_EXISTING)
-            id[i] = rest_id(REST_EXISTING_RIM, id[i]);
-        else if (select->state[i] == PASSIVE && (kind == REST_FLUID || kind == REST_SUPPORT))
+        if (select->state[i] == PASSIVE && (kind == REST_FLUID || kind == REST_SUPPORT))
             id[i] = rest_id(REST_RIM, id[i]);
     }
 }
@@ -341,7 +325,7 @@ static void keep_selected(Select *select, SkiffFill *fill) {
             points->id[i] = rest_id(REST_ACTIVE, points->id[i]);
             fill->active++;
         }
-        fill->rim += kind == REST_RIM || kind == REST_EXISTING_RIM;
+        fill->rim += kind == REST_RIM;
         order[kept++] = i;
     }
     particles_permute(points, order, kept, select->threads);

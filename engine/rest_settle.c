@@ -4,16 +4,16 @@
  * own, but not calming: what settles is all disorder, and losing it every step means creeping to its place
  * where it could fall. Bodies are held. Errors are means over the active particles.
  *
- * restSettle candidates, the paper's way: in the cloud, with rows for the candidates and what stands beside
- * them. All other points stand still and keep the pressure that still water has at their place: for the solve
- * it is a boundary condition, so what is active settles under the load it will carry, and pressures of points
+ * restSettle candidates, the paper's way: in the cloud, which then holds the candidates alone. All other
+ * points stand still (standing.h) and keep the pressure that still water has at their place: for the solve it
+ * is a boundary condition, so what is active settles under the load it will carry, and pressures of points
  * that cannot move do not pile up.
  *
  * restSettle all: in the simulation itself, all new water. A thin layer between walls and water that cannot
  * yield ends crowded or starved wherever the selection took one point too few or too many, and so the first
  * free steps move everything; and a cut through water at rest is no free surface at rest. Existing water
- * stands still here too. Beside the new it begins with the pressure of still water and then, where the new
- * water crowds it, presses harder until it is not.
+ * stands still here too. It begins with the pressures it has and then, where the new water crowds it, presses
+ * harder until it is not.
  *
  * restSettle shell: most of the way is that of the layer, all of it is needed only for the last, small one.
  * First the cloud as with candidates, but twice as thick a layer; then a few steps of everything. */
@@ -51,8 +51,9 @@ typedef struct Settle {
     Rows *rows;
     Boundary *boundary;
     Dfsph *dfsph;
-    const uint8_t *frozen; /* [particles] 1: no row; or NULL */
-    const uint8_t *held;   /* [particles] 1: does not move; or NULL */
+    StandingWater *standing; /* what is no particle and stands still; or NULL */
+    const uint8_t *frozen;   /* [particles] 1: no row; or NULL */
+    const uint8_t *held;     /* [particles] 1: does not move; or NULL */
     uint32_t active;
     int steps;     /* at most */
     int patience;  /* further ones, while a particle moves more than FAST_MOTION */
@@ -73,12 +74,14 @@ static bool settle_sort(Settle *settle, Err *err) {
 
 static bool settle_rows(Settle *settle, Err *err) {
     SkiffSim *sim = settle->sim;
+    const StandingWater *standing = settle->standing;
     const RowsJob job = {.passes = sim->passes,
                          .grid = settle->grid,
                          .particles = settle->particles,
                          .kernel = &sim->kernel,
                          .volume = sim->volume,
                          .frozen = settle->frozen,
+                         .standing = standing != NULL && standing->count > 0 ? &standing->set : NULL,
                          .threads = sim->threads};
     return rows_build(settle->rows, &job, err) && boundary_apply(settle->boundary, settle->rows, &job, err);
 }
@@ -93,8 +96,7 @@ static Settle settle_cloud(SkiffSim *sim) {
                     .rows = &cloud->rows,
                     .boundary = &cloud->boundary,
                     .dfsph = &cloud->dfsph,
-                    .frozen = cloud->frozen.data,
-                    .held = cloud->held.data};
+                    .standing = &cloud->standing};
 }
 
 static Settle settle_all(SkiffSim *sim, float surface, uint32_t active) {
@@ -109,36 +111,35 @@ static Settle settle_all(SkiffSim *sim, float surface, uint32_t active) {
                     .surface = surface};
 }
 
-/* By kind: who gets no row, and who does not move. */
+/* By kind: who gets no row. */
 static void mark_kinds(SkiffSim *sim, uint32_t evaluated) {
-    RestCloud *cloud = &sim->rest;
-    const Particles *points = &cloud->points;
-    uint8_t *frozen = cloud->frozen.data, *held = cloud->held.data;
+    const Particles *points = &sim->rest.points;
+    uint8_t *frozen = sim->rest.frozen.data;
     const uint32_t padded = particles_blocks(points) * BLOCK;
 #pragma omp parallel for schedule(static) num_threads(sim->threads)
     for (uint32_t i = 0; i < padded; i++) {
-        const RestKind kind = rest_kind(points->id[i]);
-        frozen[i] = i >= points->count || !(evaluated & 1u << kind);
-        held[i] = kind != REST_ACTIVE;
+        frozen[i] = i >= points->count || !(evaluated & 1u << rest_kind(points->id[i]));
     }
 }
 
 bool rest_search(SkiffSim *sim, uint32_t evaluated, Err *err) {
     RestCloud *cloud = &sim->rest;
-    Particles *points = &cloud->points;
     Settle settle = settle_cloud(sim);
+    settle.frozen = cloud->frozen.data;
     mark_kinds(sim, evaluated);
-    cloud->grid.apart = cloud->frozen.data;
+    cloud->grid.apart = settle.frozen;
     if (!settle_sort(&settle, err))
         return false;
     mark_kinds(sim, evaluated);
     /* the samples are the simulation's, the contacts the cloud's own */
     cloud->boundary.fixed = sim->boundary.fixed;
     cloud->boundary.moving = sim->boundary.moving;
-    if (!boundary_reserve(&cloud->boundary, points->capacity, sim->body_count, err))
+    if (!boundary_reserve(&cloud->boundary, cloud->points.capacity, sim->body_count, err))
         return false;
     boundary_place_centres(&cloud->boundary, sim->bodies, sim->body_count, sim->origin);
-    return settle_rows(&settle, err);
+    const bool good = settle_rows(&settle, err);
+    cloud->grid.apart = NULL; /* what settles has no part that only stands by */
+    return good;
 }
 
 /* ---- Steps ---- */
@@ -212,6 +213,8 @@ static float step_scale(const Settle *settle) {
     float lowest = settle->surface;
     for (uint32_t i = 0; i < settle->particles->count; i++)
         lowest = fminf(lowest, settle->particles->position[i][1]);
+    for (uint32_t i = 0; settle->standing != NULL && i < settle->standing->count; i++)
+        lowest = fminf(lowest, settle->standing->points[i][1]);
     const float depth = fmaxf(settle->surface - lowest, 8.0f * params->particle_radius);
     const float pressure = -params->gravity[1] * depth; /* p / rho0 */
     const float longest = LONGEST * params->particle_radius / sqrtf(pressure);
@@ -219,21 +222,24 @@ static float step_scale(const Settle *settle) {
 }
 
 /* P is p dt^2 / rho0: another time step, another P. */
-static void scale_pressures(Particles *particles, float factor, int threads) {
-#pragma omp parallel for schedule(static) num_threads(threads)
+static void scale_pressures(const Settle *settle, float factor) {
+    Particles *particles = settle->particles;
+    if (settle->standing != NULL)
+        standing_scale(settle->standing, factor);
+#pragma omp parallel for schedule(static) num_threads(settle->sim->threads)
     for (uint32_t i = 0; i < particles->count; i++) {
         particles->pressure[i] *= factor;
         particles->pressure_divergence[i] *= factor;
     }
 }
 
-/* Sorts, and says who takes part: in the cloud by kind, in the simulation everyone with an id from `first_id`
- * on. */
+/* Sorts, and says who takes part: all of the cloud; in the simulation everyone with an id from `first_id` on.
+ */
 typedef bool SettleSearch(Settle *settle, uint64_t first_id, Err *err);
 
 static bool search_cloud(Settle *settle, uint64_t first_id, Err *err) {
     (void)first_id;
-    return rest_search(settle->sim, 1u << REST_ACTIVE, err);
+    return settle_sort(settle, err) && settle_rows(settle, err);
 }
 
 static bool beside_moving(const Settle *settle, const uint8_t *held, uint32_t i) {
@@ -347,13 +353,17 @@ static void correct_held(Settle *settle) {
  * pressure itself pushes pairs together. */
 static void part_pairs(const Settle *settle) {
     Particles *particles = settle->particles;
-    const float r = settle->params.particle_radius;
+    const Float4 *apart_from = (const Float4 *)settle->rows->beside.apart;
+    const float r = settle->params.particle_radius, share = PART_SHARE / settle->params.time_step;
     const int32_t close = (int32_t)(32767.0f * (1.0f - 6.0f / 16.0f * (1.0f - 1.0f / 4.0f))); /* q = 1/4 */
 #pragma omp parallel for schedule(static, BLOCK) num_threads(settle->sim->threads)
     for (uint32_t i = 0; i < particles->count; i++) {
         RestNeighbour row[MAX_NEIGHBOURS];
-        const bool moves = settle->held == NULL || !settle->held[i];
-        const int length = moves ? rest_row(&settle->rows->pairs, i, row) : 0;
+        if (settle->held != NULL && settle->held[i])
+            continue;
+        for (int k = 0; apart_from != NULL && k < 3; k++)
+            particles->velocity[i][k] += share * apart_from[i][k];
+        const int length = rest_row(&settle->rows->pairs, i, row);
         for (int n = 0; n < length; n++) {
             if (row[n].weight <= close)
                 continue;
@@ -365,7 +375,7 @@ static void part_pairs(const Settle *settle) {
             const float distance = sqrtf(distance_sq);
             if (!(distance > 0.0f && distance < r))
                 continue;
-            const float speed = PART_SHARE * (r - distance) / settle->params.time_step;
+            const float speed = share * (r - distance);
             for (int k = 0; k < 3; k++)
                 particles->velocity[i][k] += speed * apart[k] / distance;
         }
@@ -397,10 +407,10 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
                                   .density_alone = !params->rest_divergence,
                                   /* Beside water that stands still a tighter stop presses the new into it:
                                    * single particles left at 0.4 m/s where it is 0.16. */
-                                  .settling = settle->held != NULL,
+                                  .settling = settle->layer || settle->held != NULL,
                                   .evaluated_count = settle->active,
                                   .threads = settle->sim->threads};
-    scale_pressures(settle->particles, scale * scale, problem.threads);
+    scale_pressures(settle, scale * scale);
     bool calm = false, fast = false;
     for (int step = 0; step < settle->steps + (fast ? settle->patience : 0) && !calm; step++, fill->steps++) {
         if (!search(settle, first_id, err))
@@ -421,13 +431,13 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
                speeds.mean < (double)params->rest_mean_speed * unit;
         move_active(settle, kept_share(params, step));
     }
-    scale_pressures(settle->particles, 1.0f / (scale * scale), problem.threads);
+    scale_pressures(settle, 1.0f / (scale * scale));
     settle->params = given;
     return true;
 }
 
-/* The cloud's new water joins the simulation's; what the stabilisation needs stays in the cloud as well as
- * `keep` (bits 1 << RestKind) says, and joins later. */
+/* The cloud's water joins the simulation's; kinds in `keep` (bits 1 << RestKind) stay in the cloud, and join
+ * later. */
 static void take_over(SkiffSim *sim, uint32_t keep, double birth, SkiffFill *fill) {
     Particles *points = &sim->rest.points;
     uint32_t kept = 0, *order = sim->rest.order.data;
@@ -437,8 +447,6 @@ static void take_over(SkiffSim *sim, uint32_t keep, double birth, SkiffFill *fil
             order[kept++] = i;
             continue;
         }
-        if (kind == REST_EXISTING || kind == REST_EXISTING_RIM)
-            continue;
         const uint32_t to =
             particles_append(&sim->particles, points->position[i], (const float[3]){0}, birth);
         sim->particles.pressure[to] = points->pressure[i];
@@ -450,17 +458,13 @@ static void take_over(SkiffSim *sim, uint32_t keep, double birth, SkiffFill *fil
     points->count = kept;
 }
 
-/* What exists beside new water takes the pressure of still water, which that is to settle against. */
-static void still_existing(SkiffSim *sim) {
+/* New water beside what settles stands there as it is. */
+static void add_rim(SkiffSim *sim) {
     const Particles *points = &sim->rest.points;
-    for (uint32_t i = 0; i < points->count; i++) {
-        const RestKind kind = rest_kind(points->id[i]);
-        if (kind != REST_EXISTING && kind != REST_EXISTING_RIM)
-            continue;
-        const uint32_t at = (uint32_t)points->id[i];
-        sim->particles.pressure[at] = points->pressure[i];
-        sim->particles.pressure_divergence[at] = 0.0f;
-    }
+    for (uint32_t i = 0; i < points->count; i++)
+        if (rest_kind(points->id[i]) == REST_RIM)
+            standing_add(&sim->rest.standing, points->position[i],
+                         points->pressure[i] + points->pressure_divergence[i]);
 }
 
 bool rest_settle(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *err) {
@@ -470,9 +474,10 @@ bool rest_settle(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err
     settle.active = fill->active;
     settle.steps = sim->params.rest_steps;
     settle.surface = request->surface;
-    /* whoever the active can feel is rim: the others need not be sorted in every step */
-    take_over(sim, 1u << REST_ACTIVE | 1u << REST_RIM | 1u << REST_EXISTING_RIM, request->birth, fill);
-    return dfsph_reserve(&sim->rest.dfsph, sim->rest.points.capacity, 1 + (uint32_t)sim->body_count, err) &&
+    add_rim(sim);
+    take_over(sim, 1u << REST_ACTIVE, request->birth, fill);
+    return standing_sort(&sim->rest.standing, sim->kernel.support, err) &&
+           dfsph_reserve(&sim->rest.dfsph, sim->rest.points.capacity, 1 + (uint32_t)sim->body_count, err) &&
            run_steps(&settle, search_cloud, 0, fill, err);
 }
 
@@ -535,7 +540,6 @@ static bool settle_water(SkiffSim *sim, float surface, uint64_t first_id, SkiffF
     fill->active = fill->particles - count_edge(&sim->particles);
     if (fill->active == 0)
         return true;
-    still_existing(sim);
     if (!buffer_reserve(&sim->rest.held, "held particles", sim->particles.capacity + SLICE, err) ||
         !buffer_reserve(&sim->rest.frozen, "held particles", sim->particles.capacity + SLICE, err))
         return false;
@@ -646,15 +650,16 @@ bool rest_fill(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *
 
 void rest_cloud_free(RestCloud *cloud) {
     particles_free(&cloud->points);
+    standing_free(&cloud->standing);
     grid_free(&cloud->grid);
     rows_free(&cloud->rows);
     cloud->boundary.fixed = cloud->boundary.moving = (BoundarySet){0};
     boundary_free(&cloud->boundary);
     dfsph_free(&cloud->dfsph);
-    Buffer *buffers[] = {&cloud->marks,    &cloud->clearance, &cloud->laid,     &cloud->source,
-                         &cloud->fate,     &cloud->frozen,    &cloud->held,     &cloud->state,
-                         &cloud->constant, &cloud->walls,     &cloud->sum,      &cloud->density,
-                         &cloud->order,    &cloud->whence[0], &cloud->whence[1]};
+    Buffer *buffers[] = {&cloud->tallies, &cloud->marks,    &cloud->clearance, &cloud->laid,
+                         &cloud->source,  &cloud->fate,     &cloud->frozen,    &cloud->held,
+                         &cloud->state,   &cloud->constant, &cloud->walls,     &cloud->sum,
+                         &cloud->density, &cloud->order,    &cloud->whence[0], &cloud->whence[1]};
     for (size_t b = 0; b < sizeof buffers / sizeof *buffers; b++)
         buffer_free(buffers[b]);
     for (int f = 0; f <= PARTICLE_FIELD_COUNT; f++)

@@ -29,6 +29,19 @@ static uint32_t rows_allocate(void *user, int thread, uint32_t entries) {
     return first;
 }
 
+/* Room for what standing water gives. */
+static bool reserve_standing(Rows *rows, const Particles *particles, const StandingSet *standing, Err *err) {
+    const size_t bytes = (particles->capacity + SLICE) * sizeof(Float4);
+    rows->beside = (Standing){NULL, NULL};
+    if (standing == NULL)
+        return true;
+    if (!buffer_reserve(&rows->push, "push of standing water", bytes, err) ||
+        !buffer_reserve(&rows->apart, "standing water nearby", bytes, err))
+        return false;
+    rows->beside = (Standing){rows->push.data, rows->apart.data};
+    return true;
+}
+
 static bool rows_reserve(Rows *rows, const Particles *particles, int threads, Err *err) {
     const size_t padded = particles->capacity + SLICE, slices = particles->capacity / SLICE + 1;
     if (rows->pool_entries == 0) /* 45 places a particle: 39 are needed in water at rest */
@@ -67,7 +80,8 @@ static int rows_search(Rows *rows, const Passes *passes, const SearchJob *job, i
 bool rows_build(Rows *rows, const RowsJob *build, Err *err) {
     const Particles *particles = build->particles;
     for (;;) {
-        if (!rows_reserve(rows, particles, build->threads, err))
+        if (!rows_reserve(rows, particles, build->threads, err) ||
+            !reserve_standing(rows, particles, build->standing, err))
             return false;
         rows->neighbours = rows->neighbour_counts.data;
         const SearchJob job = {.grid = &build->grid->cells,
@@ -90,6 +104,8 @@ bool rows_build(Rows *rows, const RowsJob *build, Err *err) {
                                .gradient_sum = rows->gradient_sum.data,
                                .neighbours = rows->neighbours,
                                .row_size = particles->row_size,
+                               .standing = build->standing,
+                               .beside = rows->beside,
                                .allocate = rows_allocate,
                                .rows = rows};
         uint32_t fault;
@@ -161,6 +177,8 @@ void rows_free(Rows *rows) {
     buffer_free(&rows->corrected_sum);
     buffer_free(&rows->shape[0]);
     buffer_free(&rows->shape[1]);
+    buffer_free(&rows->push);
+    buffer_free(&rows->apart);
     buffer_free(&rows->pool);
     buffer_free(&rows->weights);
     buffer_free(&rows->slices);

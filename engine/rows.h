@@ -17,13 +17,14 @@ typedef struct Rows {
     PairData
         corrected; /* the same pairs with gradients that are right for linear fields, after rows_correct */
     uint16_t *neighbours; /* [particles] fluid and boundary */
+    Standing beside;      /* what RowsJob.standing gives them; without it NULL */
     bool wide;
     /* pool of row entries: threads take chunks, slices take from their thread's chunk */
     Buffer pool, weights, slices, density, gradient_sum, neighbour_counts;
     uint32_t pool_entries;
     atomic_uint pool_used;
     RowShare shares[SKIFF_MAX_THREADS];
-    Buffer gradients, corrected_sum, shape[2];
+    Buffer gradients, corrected_sum, shape[2], push, apart;
     Buffer scratch; /* Scratch of every thread */
 } Rows;
 
@@ -33,8 +34,9 @@ typedef struct RowsJob {
     const Grid *grid;
     const Particles *particles;
     const Kernel *kernel;
-    float volume;          /* m^3, of a particle */
-    const uint8_t *frozen; /* NULL, or [particles] 1: others see it, but it gets no row */
+    float volume;                /* m^3, of a particle */
+    const uint8_t *frozen;       /* NULL, or [particles] 1: others see it, but it gets no row */
+    const StandingSet *standing; /* NULL, or more water that does not move */
     int threads;
 } RowsJob;
 /* Neighbours, densities (fluid part) and gradient sums (fluid part, fixed-point units) of the sorted

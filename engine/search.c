@@ -11,8 +11,16 @@
 /* The cell whose candidates lie in scratch. */
 typedef struct SearchCell {
     uint32_t index;
-    int candidate_count;
+    int candidate_count, standing_count;
 } SearchCell;
+
+/* Points by cell, to take candidates from. */
+typedef struct Source {
+    const CellGrid *grid;
+    const float *points[3];
+    const uint32_t *member; /* who they are; NULL: as they stand */
+    int parts;              /* of a slab of cells */
+} Source;
 
 /* How far coordinates are outside [low, high]. */
 static inline Vf beyond(Vf x, float low, float high) {
@@ -57,33 +65,65 @@ static Reach cell_reach(const SearchJob *job, uint32_t cell) {
     return reach;
 }
 
-/* Copies those particles of the 27 cells around `cell` that one of its own may feel into scratch, run by run,
- * and fills the last lanes with points that are near nothing. Returns how many there are, -1 for too many. */
-static int gather_candidates(const SearchJob *job, uint32_t cell, Scratch *scratch) {
-    const CellGrid *grid = job->grid;
+/* Copies those points of the 27 cells around `cell` that are within reach, run by run, and fills the last
+ * lanes with points that are near nothing. Returns how many there are, -1 for too many. */
+static int gather_candidates(const Source *source, int64_t cell, const Reach *reach, Candidates *to) {
+    const CellGrid *grid = source->grid;
     const int32_t column = grid->size[1], slab = grid->size[1] * grid->size[2];
-    const Reach reach = cell_reach(job, cell);
-    const float *const x = job->points[0], *const y = job->points[1], *const z = job->points[2];
-    const int32_t *member = (const int32_t *)job->member;
+    const float *const x = source->points[0], *const y = source->points[1], *const z = source->points[2];
+    const int32_t *member = (const int32_t *)source->member;
     int n = 0;
-    for (int run = 0; run < 9 * job->parts; run++) {
-        const int64_t slabs = (run / 3 % 3 - 1) * job->parts + run / 9;
-        const int64_t middle = (int64_t)cell + slabs * slab + (run % 3 - 1) * column;
+    for (int run = 0; run < 9 * source->parts; run++) {
+        const int64_t slabs = (run / 3 % 3 - 1) * source->parts + run / 9;
+        const int64_t middle = cell + slabs * slab + (run % 3 - 1) * column;
         const uint32_t end = grid->start[middle + 2];
         for (uint32_t j = grid->start[middle - 1]; j < end; j += LANES) {
             const Vf p[3] = {vf_load(x + j), vf_load(y + j), vf_load(z + j)};
-            const Vi who = vi_load(member + j);
-            const Vm mine = (Vm)(within_reach(&reach, p[0], p[1], p[2]) & first_lanes(end - j));
+            const Vi who = member != NULL ? vi_load(member + j) : vi_add(vi_set((int32_t)j), vi_lane());
+            const Vm mine = (Vm)(within_reach(reach, p[0], p[1], p[2]) & first_lanes(end - j));
             if (n > MAX_CANDIDATES - LANES)
                 return -1;
-            vf_compress(scratch->x + n, p[0], mine);
-            vf_compress(scratch->y + n, p[1], mine);
-            vf_compress(scratch->z + n, p[2], mine);
-            n += vi_compress(scratch->halves + n, vi_add(who, who), mine);
+            vf_compress(to->x + n, p[0], mine);
+            vf_compress(to->y + n, p[1], mine);
+            vf_compress(to->z + n, p[2], mine);
+            n += vi_compress(to->halves + n, vi_add(who, who), mine);
         }
     }
-    vf_store(scratch->x + n, vf_set(1e18f));
+    vf_store(to->x + n, vf_set(1e18f));
     return n;
+}
+
+/* A cell of the search in the grid of standing water; both begin on multiples of the same edge. False:
+ * outside, or at the rim, whose neighbours are empty. */
+static bool standing_cell(const SearchJob *job, uint32_t index, int64_t *cell) {
+    const CellGrid *from = job->grid, *to = &job->standing->grid;
+    const int32_t column = (int32_t)index / from->size[1];
+    const int32_t c[3] = {column / from->size[2] / job->parts, (int32_t)index % from->size[1],
+                          column % from->size[2]};
+    int32_t moved[3];
+    for (int k = 0; k < 3; k++) {
+        moved[k] = c[k] + (int32_t)lrintf((from->origin[k] - to->origin[k]) * to->inv_size);
+        if (moved[k] < 1 || moved[k] > to->size[k] - 2)
+            return false;
+    }
+    *cell = cell_grid_index(to, moved[0], moved[1], moved[2]);
+    return true;
+}
+
+/* Candidates of another cell. */
+static void enter_cell(const SearchJob *job, uint32_t index, SearchCell *cell, Scratch *scratch) {
+    const Source particles = {
+        job->grid, {job->points[0], job->points[1], job->points[2]}, job->member, job->parts};
+    const StandingSet *standing = job->standing;
+    const Reach reach = cell_reach(job, index);
+    int64_t there;
+    cell->index = index;
+    cell->candidate_count = gather_candidates(&particles, index, &reach, &scratch->candidates);
+    cell->standing_count = 0;
+    if (standing != NULL && standing_cell(job, index, &there)) {
+        const Source source = {&standing->grid, {standing->x, standing->y, standing->z}, NULL, 1};
+        cell->standing_count = gather_candidates(&source, there, &reach, &scratch->standing);
+    }
 }
 
 typedef struct NeighbourCount {
@@ -92,18 +132,18 @@ typedef struct NeighbourCount {
 
 /* Neighbours of the k-th particle in the order of cells, in the order of the candidates, the near ones apart;
  * all is -1 when there are too many. */
-static NeighbourCount find_neighbours(const SearchJob *job, int candidate_count, uint32_t k, Scratch *scratch,
-                                      int32_t *list, int32_t *far_list) {
+static NeighbourCount find_neighbours(const SearchJob *job, int candidate_count, uint32_t k,
+                                      const Candidates *candidates, int32_t *list, int32_t *far_list) {
     const Vf x = vf_set(job->points[0][k]), y = vf_set(job->points[1][k]), z = vf_set(job->points[2][k]);
     const Vf limit = vf_set(job->kernel.support * job->kernel.support);
     const Vf near_limit = vf_set(near_distance_sq(&job->kernel));
     const Vi self = vi_set((int32_t)(2 * job->member[k]));
     int near = 0, far = 0;
     for (int c = 0; c < candidate_count; c += LANES) {
-        const Vf dx = vf_sub(x, vf_load(scratch->x + c));
-        const Vf dy = vf_sub(y, vf_load(scratch->y + c));
-        const Vf dz = vf_sub(z, vf_load(scratch->z + c));
-        const Vi halves = vi_load(scratch->halves + c);
+        const Vf dx = vf_sub(x, vf_load(candidates->x + c));
+        const Vf dy = vf_sub(y, vf_load(candidates->y + c));
+        const Vf dz = vf_sub(z, vf_load(candidates->z + c));
+        const Vi halves = vi_load(candidates->halves + c);
         const Vf distance_sq = vf_fma(dx, dx, vf_fma(dy, dy, vf_mul(dz, dz)));
         const Vm is_near = vf_less(distance_sq, near_limit);
         const Vm is_far = vf_less(distance_sq, limit) & (Vm)~is_near;
@@ -113,6 +153,24 @@ static NeighbourCount find_neighbours(const SearchJob *job, int candidate_count,
             return (NeighbourCount){-1, 0};
     }
     return (NeighbourCount){near + far, near};
+}
+
+/* The same among standing water: how many, -1 for too many. */
+static int find_standing(const SearchJob *job, int candidate_count, uint32_t k, const Candidates *candidates,
+                         int32_t *list) {
+    const Vf x = vf_set(job->points[0][k]), y = vf_set(job->points[1][k]), z = vf_set(job->points[2][k]);
+    const Vf limit = vf_set(job->kernel.support * job->kernel.support);
+    int count = 0;
+    for (int c = 0; c < candidate_count; c += LANES) {
+        const Vf dx = vf_sub(x, vf_load(candidates->x + c));
+        const Vf dy = vf_sub(y, vf_load(candidates->y + c));
+        const Vf dz = vf_sub(z, vf_load(candidates->z + c));
+        const Vf distance_sq = vf_fma(dx, dx, vf_fma(dy, dy, vf_mul(dz, dz)));
+        count += vi_compress(list + count, vi_load(candidates->halves + c), vf_less(distance_sq, limit));
+        if (count > MAX_NEIGHBOURS)
+            return -1;
+    }
+    return candidate_count < 0 ? -1 : count;
 }
 
 static inline void entry_store_place(uint8_t *entries, uint32_t entry, bool wide, Vi place) {
@@ -191,35 +249,111 @@ static bool pack_slice(const SearchJob *job, uint32_t first, const SliceRows *ro
     return wide || misfit == 0;
 }
 
+/* ---- Standing water ---- */
+
+/* Sums over standing water, a lane a particle. */
+typedef struct StandingSum {
+    Vf g[3], push[3], apart[3], weight, touching;
+} StandingSum;
+
+/* Adds a neighbour of each particle at d; valid: of those that have one more. */
+static inline void standing_add(const Kernel *kernel, Vm valid, const Vf d[3], Vf p, StandingSum *sum) {
+    const float r = 0.25f * kernel->support;
+    const Vf distance_sq = vf_fma(d[0], d[0], vf_fma(d[1], d[1], vf_mul(d[2], d[2])));
+    Vf factor, weight;
+    pair_kernel(kernel, distance_sq, &factor, &weight);
+    factor = vf_mask(valid, factor);
+    /* in whole units, as the weights of rows are: the selection may treat both alike */
+    const Vf rounded = vf_from_int(vi_round(vf_mul(weight, vf_set(32767.0f / kernel->w_scale))));
+    sum->weight = vf_add(sum->weight, vf_mask(valid, rounded));
+    for (int k = 0; k < 3; k++) {
+        const Vf g = vf_mul(factor, d[k]);
+        sum->g[k] = vf_add(sum->g[k], g);
+        sum->push[k] = vf_fma(p, g, sum->push[k]);
+    }
+    const Vm close = vf_less(distance_sq, vf_set(r * r)) & valid;
+    if (close == 0)
+        return;
+    const Vf lack = vf_mask(close, vf_fma(vf_set(r), vf_rsqrt(distance_sq), vf_set(-1.0f)));
+    for (int k = 0; k < 3; k++)
+        sum->apart[k] = vf_fma(lack, d[k], sum->apart[k]);
+    const Vm touching = vf_less(distance_sq, vf_set(0.25f * r * r)) & close;
+    sum->touching = vf_add(sum->touching, vf_mask(touching, vf_set(1.0f)));
+}
+
+/* What standing water gives a slice's particles; adds its part to their densities and gradient sums. */
+static void add_standing(const SearchJob *job, uint32_t first, const Scratch *scratch) {
+    const int32_t *lists[SLICE];
+    int32_t counts[SLICE], longest = 0, halves[SLICE][SLICE];
+    for (uint32_t l = 0; l < SLICE; l++) {
+        const uint32_t place = (first + l) % ROW_GROUP;
+        const bool real = first + l < job->count;
+        lists[l] = scratch->standing_lists + (real ? scratch->standing_start[place] : 0);
+        counts[l] = real ? scratch->standing_count[place] : 0;
+        longest = counts[l] > longest ? counts[l] : longest;
+    }
+    const Kernel kernel = job->kernel;
+    const Float4 *points = job->standing->points;
+    const Vi count = vi_load(counts), none = vi_set(0);
+    Vf x, y, z, w, nx, ny, nz, p;
+    vf_load4(job->position + first, &x, &y, &z, &w);
+    StandingSum sum = {.weight = vf_zero(), .touching = vf_zero()};
+    for (int k = 0; k < 3; k++)
+        sum.g[k] = sum.push[k] = sum.apart[k] = vf_zero();
+    for (int k = 0; k < longest; k++) {
+        if (k % SLICE == 0)
+            next_places(lists, count, none, k, halves);
+        vf_gather4_i32(points, halves[k % SLICE], &nx, &ny, &nz, &p);
+        const Vf d[3] = {vf_sub(x, nx), vf_sub(y, ny), vf_sub(z, nz)};
+        standing_add(&kernel, vi_less(vi_set(k), count), d, p, &sum);
+    }
+    /* minus V grad W in steps of the factors */
+    const Vf unit = vf_set(-job->volume * kernel.gradient_scale * kernel.inv_support / FACTOR_STEPS);
+    const Vf share = vf_mul(vf_set(job->volume * kernel.w_scale / 32767.0f), sum.weight);
+    vf_store4(job->beside.push + first, vf_mul(unit, sum.push[0]), vf_mul(unit, sum.push[1]),
+              vf_mul(unit, sum.push[2]), share);
+    vf_store4(job->beside.apart + first, sum.apart[0], sum.apart[1], sum.apart[2], sum.touching);
+    vf_store(job->density + first, vf_add(vf_load(job->density + first), share));
+    vf_load4(job->gradient_sum + first, &x, &y, &z, &w);
+    vf_store4(job->gradient_sum + first, vf_fma(unit, sum.g[0], x), vf_fma(unit, sum.g[1], y),
+              vf_fma(unit, sum.g[2], z), w);
+}
+
 /* Lists the neighbours of a group's particles in scratch. False, and *fault the particle, when one has too
  * many. */
 static bool list_group(const SearchJob *job, uint32_t begin, SearchCell *cell, Scratch *scratch,
                        uint32_t *fault) {
     const uint32_t end = begin + ROW_GROUP < job->count ? begin + ROW_GROUP : job->count;
-    uint32_t used = 0, far_used = 0;
+    uint32_t used = 0, far_used = 0, standing_used = 0;
     for (uint32_t k = begin; k < end; k++) {
         const uint32_t i = job->member[k];
         scratch->list_start[i % ROW_GROUP] = used;
         scratch->far_start[i % ROW_GROUP] = far_used;
+        scratch->standing_start[i % ROW_GROUP] = standing_used;
+        scratch->standing_count[i % ROW_GROUP] = 0;
         job->neighbours[i] = 0;
         job->row_size[i] = 0;
         if (job->frozen != NULL && job->frozen[i])
             continue;
         NeighbourCount found = {-1, 0};
-        if (job->cell[k] != cell->index) {
-            cell->index = job->cell[k];
-            cell->candidate_count = gather_candidates(job, cell->index, scratch);
-        }
+        if (job->cell[k] != cell->index)
+            enter_cell(job, job->cell[k], cell, scratch);
         if (cell->candidate_count >= 0)
-            found = find_neighbours(job, cell->candidate_count, k, scratch, scratch->lists + used,
-                                    scratch->far + far_used);
-        if (found.all < 0) {
+            found = find_neighbours(job, cell->candidate_count, k, &scratch->candidates,
+                                    scratch->lists + used, scratch->far + far_used);
+        const int standing = cell->standing_count == 0
+                                 ? 0
+                                 : find_standing(job, cell->standing_count, k, &scratch->standing,
+                                                 scratch->standing_lists + standing_used);
+        if (found.all < 0 || standing < 0) {
             *fault = i;
             return false;
         }
         used += (uint32_t)found.all + LANES;
         far_used += (uint32_t)(found.all - found.near);
-        job->neighbours[i] = (uint16_t)found.all;
+        standing_used += (uint32_t)standing + LANES;
+        scratch->standing_count[i % ROW_GROUP] = standing;
+        job->neighbours[i] = (uint16_t)(found.all + standing);
         job->row_size[i] = row_size_of((uint32_t)found.all, (uint32_t)found.near);
     }
     return true;
@@ -273,6 +407,8 @@ int PASSES_NAME(search_)(const SearchJob *job, uint32_t block, int thread, Scrat
             return SEARCH_NEEDS_MEMORY;
         if (!pack_slice(job, first, rows, scratch))
             status = SEARCH_NEEDS_WIDE;
+        if (job->standing != NULL)
+            add_standing(job, first, scratch);
     }
     return status;
 }

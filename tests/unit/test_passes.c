@@ -1,6 +1,7 @@
 /* The pair passes against sums taken in double precision over all pairs, against each other across
  * instruction sets, and the operator identities the solvers rely on. */
 #include "engine/rows.h"
+#include "engine/standing.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -336,6 +337,86 @@ static void test_margins(void **state) {
             }
 }
 
+/* The search beside standing water: a third of the cloud, and one point that all but touches a particle. */
+static void search_beside(const Passes *passes, Cloud *cloud, StandingWater *water) {
+    static Cloud whole;
+    Err err = {0};
+    cloud_make(&whole, passes, false);
+    *cloud = (Cloud){.kernel = whole.kernel, .volume = whole.volume};
+    *water = (StandingWater){0};
+    assert_true(particles_reserve(&cloud->particles, COUNT, &err));
+    assert_true(standing_reserve(water, COUNT + 1, &err));
+    const Float4 *position = (const Float4 *)whole.particles.position;
+    for (int i = 0; i < COUNT; i++) {
+        if (position[i][0] + 0.3f * position[i][2] < 0.3f)
+            standing_add(water, position[i], whole.particles.pressure[i]);
+        else
+            particles_append(&cloud->particles, position[i], (const float[3]){0}, 0.0);
+    }
+    standing_add(water, (const float[3]){position[0][0] + 0.01f, position[0][1], position[0][2]}, 1.0f);
+    particles_append(&cloud->particles, position[0], (const float[3]){0}, 0.0);
+    cloud_free(&whole);
+    assert_true(standing_sort(water, 0.1f, &err));
+    const GridBounds domain = {{-5, -5, -5}, {5, 5, 5}};
+    assert_true(grid_sort(&cloud->grid, &cloud->particles, 0.1f, &domain, NULL, 1, &err));
+    const RowsJob job = {.passes = passes,
+                         .grid = &cloud->grid,
+                         .particles = &cloud->particles,
+                         .kernel = &cloud->kernel,
+                         .volume = cloud->volume,
+                         .standing = &water->set,
+                         .threads = 1};
+    assert_true(rows_build(&cloud->rows, &job, &err));
+}
+
+static void test_standing_water(void **state) {
+    (void)state;
+    static Cloud cloud;
+    StandingWater water;
+    search_beside(&passes_plain, &cloud, &water);
+    const Standing *beside = &cloud.rows.beside;
+    const double volume = (double)cloud.volume, r = 0.025;
+    double touched = 0.0;
+    for (uint32_t i = 0; i < cloud.particles.count; i++) {
+        double share = 0.0, push[3] = {0}, apart[3] = {0}, sum[3] = {0}, touching = 0.0, own = 0.0;
+        for (uint32_t j = 0; j < water.count + cloud.particles.count; j++) {
+            const bool stands = j < water.count;
+            const float *other = stands ? water.points[j] : cloud.particles.position[j - water.count];
+            double d[3], sq = 0.0;
+            for (int k = 0; k < 3; k++) {
+                d[k] = (double)cloud.particles.position[i][k] - (double)other[k];
+                sq += d[k] * d[k];
+            }
+            const double distance = sqrt(sq);
+            if (distance >= 0.1 || (!stands && j - water.count == i))
+                continue;
+            const double w = volume * (double)kernel_w(&cloud.kernel, (float)distance);
+            *(stands ? &share : &own) += w;
+            touching += stands && distance < 0.5 * r;
+            for (int k = 0; k < 3; k++) {
+                const double g = volume * kernel_gradient_factor(&cloud.kernel, distance) * d[k];
+                sum[k] += g;
+                push[k] += stands ? (double)other[3] * g : 0.0;
+                apart[k] += stands && distance < r ? (r - distance) * d[k] / distance : 0.0;
+            }
+        }
+        const double rounding = 34.0 * 0.1 * (double)cloud.rows.pairs.factor_unit;
+        for (int k = 0; k < 3; k++) {
+            assert_float_equal(beside->push[i][k], push[k], 1e-4);
+            assert_float_equal(beside->apart[i][k], apart[k], 1e-7);
+            assert_float_equal(cloud.rows.pairs.gradient_sum[i][k], sum[k], rounding);
+        }
+        assert_float_equal(beside->push[i][3], share, 1e-4); /* thirty weights in units of W(0) / 32767 */
+        assert_float_equal(beside->apart[i][3], touching, 0.0);
+        assert_float_equal(cloud.rows.pairs.density[i], own + share + volume * (double)cloud.kernel.w_scale,
+                           1e-4);
+        touched += touching;
+    }
+    assert_true(touched > 0.0);
+    cloud_free(&cloud);
+    standing_free(&water);
+}
+
 /* The sort is stable and the same for every number of threads; particles outside go, or are named. */
 static void test_sort(void **state) {
     (void)state;
@@ -390,6 +471,7 @@ int main(void) {
         cmocka_unit_test(test_correction),
         cmocka_unit_test(test_same_bits),
         cmocka_unit_test(test_crowd),
+        cmocka_unit_test(test_standing_water),
         cmocka_unit_test(test_margins),
         cmocka_unit_test(test_sort),
     };
