@@ -24,7 +24,7 @@ typedef struct Dfsph {
     Float4 *operand;       /* positions, and what D^T is applied to in the fourth place */
     Float4 *guess;         /* velocity after the pressure evaluated last */
     Float4 *answer;        /* D^T z */
-    Float4 *spare;         /* for others between the solves, as are the two above */
+    Float4 *spare;         /* for others between the solves, as are the two above; in them see base */
     double (*response)[6]; /* [objects] a body's answer: (D^T p) of its six velocities */
     float *residual, *direction, *image, *new_image, *inv_diagonal;
     float *source;         /* what stands beside dt D v: relative density */

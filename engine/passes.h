@@ -104,7 +104,7 @@ typedef struct Scratch {
     int32_t lists[ROW_GROUP * (MAX_NEIGHBOURS + LANES) + 3 * LANES],
         far[ROW_GROUP * MAX_NEIGHBOURS + 3 * LANES];
     uint32_t list_start[ROW_GROUP], far_start[ROW_GROUP];
-    /* their neighbours among standing water, and where each particle's end and begin */
+    /* their neighbours among standing water; where each particle's begin, and how many they are */
     int32_t standing_lists[ROW_GROUP * (MAX_NEIGHBOURS + LANES) + 3 * LANES];
     uint32_t standing_start[ROW_GROUP];
     int32_t standing_count[ROW_GROUP];

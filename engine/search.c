@@ -3,7 +3,8 @@
  *
  * The 27 cells around a particle are nine runs of particles (eighteen where slabs of cells have two parts);
  * what is near the cell's own is copied once, and each of these keeps those within a support radius. The
- * lists of a group become the rows of its slices, with densities and sums of gradients on the way. */
+ * lists of a group become the rows of its slices, with densities and sums of gradients on the way. Standing
+ * water is found alike, in a grid of its own, and is summed up at once. */
 #include "pair.h"
 
 /* ---- Neighbour search ---- */
