@@ -32,6 +32,7 @@ typedef struct Bench {
     SkiffSim *sim;
     Pilot pilot;
     Window *windows;
+    double *figures; /* [windows] for medians */
     /* sums over all steps measured */
     double density_iterations, divergence_iterations, density_error, divergence_error, neighbours, solve_ms;
     double density_max; /* largest */
@@ -96,26 +97,18 @@ static double search_figure(const Window *window, int phase) {
            window->phase_ms[SKIFF_PHASE_BOUNDARY];
 }
 
-static int compare_doubles(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* Median, and the smallest and largest where wanted. */
 static double median(const Bench *bench, WindowFigure *figure, int phase, double *least, double *most) {
     int count = bench->args->windows;
-    double *values = malloc((size_t)count * sizeof *values);
-    if (!values)
-        abort();
+    double *values = bench->figures;
     for (int w = 0; w < count; w++)
         values[w] = figure(&bench->windows[w], phase);
-    qsort(values, (size_t)count, sizeof *values, compare_doubles);
+    summary_sort(values, (size_t)count);
     double middle = 0.5 * (values[(count - 1) / 2] + values[count / 2]);
     if (least)
         *least = values[0];
     if (most)
         *most = values[count - 1];
-    free(values);
     return middle;
 }
 
@@ -130,7 +123,7 @@ static void put_count(json_t *result, const char *key, uint64_t count) {
 }
 
 static void put_text(json_t *result, const char *key, const char *text) {
-    json_object_set_new(result, key, json_string(text));
+    json_object_set_new(result, key, json_text_string(text));
 }
 
 static void put_origin(const Bench *bench, json_t *result) {
@@ -192,6 +185,8 @@ static json_t *make_result(const Bench *bench) {
 
 /* ---- Results ---- */
 
+enum { LABEL_WIDTH = 54 };
+
 static double number(const json_t *result, const char *key) {
     return json_number_value(json_object_get(result, key));
 }
@@ -201,7 +196,7 @@ static const char *text(const json_t *result, const char *key) {
 }
 
 static void print_row(const char *label, double value, const char *unit) {
-    printf("  %-44s %10.4g %s\n", label, value, unit);
+    printf("  %-*s %10.4g %s\n", LABEL_WIDTH, label, value, unit);
 }
 
 static void print_table(const Bench *bench, const json_t *result) {
@@ -211,12 +206,12 @@ static void print_table(const Bench *bench, const json_t *result) {
            text(result, "cpu"), number(result, "threads"), text(result, "isa"), text(result, "commit"));
     printf("%d windows of %d steps after %g s; medians\n\n", bench->args->windows, bench->args->steps,
            bench->args->settle);
-    printf("  %-44s %10s %6s\n", "phase", "ms", "%");
+    printf("  %-*s %10s %6s\n", LABEL_WIDTH, "phase", "ms", "%");
     for (int i = 0; i < SKIFF_PHASE_COUNT; i++) {
         double ms = median(bench, phase_figure, i, NULL, NULL);
-        printf("  %-44s %10.2f %6.1f\n", skiff_phase_label(i), ms, 100 * ms / step_ms);
+        printf("  %-*s %10.2f %6.1f\n", LABEL_WIDTH, skiff_phase_label(i), ms, 100 * ms / step_ms);
     }
-    printf("  %-44s %10.2f %6.1f   (windows: %.2f to %.2f)\n\n", "step", step_ms, 100.0,
+    printf("  %-*s %10.2f %6.1f   (windows: %.2f to %.2f)\n\n", LABEL_WIDTH, "step", step_ms, 100.0,
            number(result, "ms_min"), number(result, "ms_max"));
     print_row("search, sort and boundary terms", number(result, "search_ms"), "ms");
     print_row("one solver iteration", number(result, "iteration_ms"), "ms");
@@ -227,9 +222,9 @@ static void print_table(const Bench *bench, const json_t *result) {
     print_row("divergence error, mean", number(result, "divergence_error_percent"), "%");
     print_row("neighbours, mean", number(result, "neighbours"), "");
     print_row("peak memory", number(result, "peak_rss_mb"), "MB");
-    printf("  %-44s %10.0f\n", "particles a second", number(result, "particles_per_s"));
+    printf("  %-*s %10.0f\n", LABEL_WIDTH, "particles a second", number(result, "particles_per_s"));
     print_row("real-time factor (1 is real time)", number(result, "real_time_factor"), "");
-    printf("  %-44s %s\n", "state hash", text(result, "state_hash"));
+    printf("  %-*s %s\n", LABEL_WIDTH, "state hash", text(result, "state_hash"));
 }
 
 /* tests/bench/results of the tree whose assets/scenes the scene is in; false when there is no such folder. */
@@ -239,7 +234,7 @@ static bool find_results_folder(const CliArgs *args, char folder[PATH_MAX]) {
         snprintf(folder, PATH_MAX, "%s", args->results);
         return true;
     }
-    if (!realpath(args->scene, scene))
+    if (!realpath(args->operand, scene))
         return false;
     for (int i = 0; i < 3; i++) { /* file, scenes, assets */
         char *slash = strrchr(scene, '/');
@@ -356,16 +351,18 @@ static bool bench_scene(Bench *bench, Err *err) {
 }
 
 bool bench_command(const CliArgs *args, Err *err) {
-    Scene *scene = scene_load(args->scene, args->edits, args->edit_count, err);
+    Scene *scene = scene_load(args->operand, args->edits, args->edit_count, err);
     if (!scene)
         return false;
     Bench bench = {.args = args, .scene = scene};
     const bool read = pilot_read(&bench.pilot, scene, args->input, NULL, err);
     bench.sim = read ? scene_start(scene, args->threads, (SkiffSimd)args->simd, err) : NULL;
     bench.windows = calloc((size_t)args->windows, sizeof *bench.windows);
-    bool ok =
-        bench.sim && (bench.windows || err_set(err, ERR_IO, "out of memory")) && bench_scene(&bench, err);
+    bench.figures = calloc((size_t)args->windows, sizeof *bench.figures);
+    const bool memory = bench.windows && bench.figures;
+    bool ok = bench.sim && (memory || err_set(err, ERR_IO, "out of memory")) && bench_scene(&bench, err);
     free(bench.windows);
+    free(bench.figures);
     skiff_destroy(bench.sim);
     pilot_free(&bench.pilot);
     scene_free(scene);

@@ -290,6 +290,11 @@ static bool set_up_pyramid(CarensacSetup *setup, double radius, const char *fold
     return true;
 }
 
+double carensac_time_step(double radius) {
+    static const double paper = 0.003; /* s */
+    return paper * radius / CARENSAC_RADIUS;
+}
+
 void carensac_set_paper_method(SkiffParams *params) {
     params->rest_settle = 1;   /* candidates */
     params->rest_schedule = 0; /* constant */

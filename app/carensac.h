@@ -110,6 +110,8 @@ enum {
 
 /* Particle radius of all of the paper's experiments, m. */
 #define CARENSAC_RADIUS 0.025
+/* The paper's steps, or as long ones for particles of another radius (m), s. */
+double carensac_time_step(double radius);
 
 /* Set-up of an experiment of table1 for particles of `radius` (m); fig2 and fig4c use the floating cube.
  * Files it needs are written to `folder`. */

@@ -61,7 +61,7 @@ static bool print_json(json_t *value, Err *err) {
 bool check_command(const CliArgs *args, Err *err) {
     if (args->schema)
         return print_json(scene_schema(), err);
-    Scene *scene = scene_load(args->scene, args->edits, args->edit_count, err);
+    Scene *scene = scene_load(args->operand, args->edits, args->edit_count, err);
     if (!scene)
         return false;
     Pilot pilot;

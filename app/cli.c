@@ -55,15 +55,16 @@ typedef struct Command {
 /* ---- The tables ---- */
 
 #define AT(member) .offset = offsetof(CliArgs, member)
-#define OPTION_ROWS_ENGINE                                                                                   \
-    {0,           "threads",                                                                                 \
-     "N",         OPTION_INTEGER,                                                                            \
-     AT(threads), .min = 1,                                                                                  \
-     .max = 1024, .help = "Threads (default: one for each core). The results do not depend on it"},          \
+#define OPTION_ROW_THREADS                                                                                   \
     {                                                                                                        \
+        0, "threads", "N", OPTION_INTEGER, AT(threads),                                                      \
+            .min = 1, .max = SKIFF_MAX_THREADS,                                                              \
+            .help = "Threads (default: one for each core). The results do not depend on it"                  \
+    }
+#define OPTION_ROWS_ENGINE                                                                                   \
+    OPTION_ROW_THREADS, {                                                                                    \
         0, "simd", "ISA", OPTION_CHOICE, AT(simd),                                                           \
-            .names = "auto|plain|avx2|avx512",                                                               \
-            .help = "Instruction set: auto (default), plain, avx2 or avx512"                                 \
+            .names = SKIFF_SIMD_NAMES, .help = "Instruction set: auto (default), plain, avx2 or avx512"      \
     }
 #define OPTION_ROW_SET                                                                                       \
     {                                                                                                        \
@@ -77,6 +78,8 @@ typedef struct Command {
             .help = "Input file that drives and steers, in place of the scene's. Lines: TIME "               \
                     "throttle|rudder|heading VALUE, TIME press|release KEY, TIME camera NAME"                \
     }
+#define OPTION_ROW_JSON                                                                                      \
+    { 0, "json", NULL, OPTION_FLAG, AT(json), .help = "One line of JSON in place of the table" }
 #define OPTION_ROW_HELP                                                                                      \
     { 'h', "help", NULL, OPTION_FLAG, AT(help), .help = "Show this help" }
 
@@ -100,7 +103,7 @@ typedef struct Command {
          OPTION_INTEGER,                                                                                     \
          PICTURE(supersample),                                                                               \
          .min = 1,                                                                                           \
-         .max = 4,                                                                                           \
+         .max = RENDER_SUPERSAMPLE_MAX,                                                                      \
          .help = "Draw N times larger, then average; for stills"},                                           \
         {0,                                                                                                  \
          "look",                                                                                             \
@@ -179,7 +182,7 @@ static const Option bench_options[] = {
     {0, "steps", "N", OPTION_INTEGER, AT(steps), .min = 1, .max = 1e6,
      .help = "Steps of a window (default 20)"},
     {0, "windows", "N", OPTION_INTEGER, AT(windows), .min = 1, .max = 1e4, .help = "Windows (default 5)"},
-    {0, "json", NULL, OPTION_FLAG, AT(json), .help = "One line of JSON in place of the table"},
+    OPTION_ROW_JSON,
     OPTION_ROW_INPUT,
     OPTION_ROWS_ENGINE,
     OPTION_ROW_SET,
@@ -190,9 +193,6 @@ static const Option bench_options[] = {
     {'q', "quiet", NULL, OPTION_FLAG, AT(quiet), .help = "No progress on stderr"},
     OPTION_ROW_HELP,
 };
-
-#define OPTION_ROW_JSON                                                                                      \
-    { 0, "json", NULL, OPTION_FLAG, AT(json), .help = "One line of JSON in place of the table" }
 
 static const Option profile_options[] = {
     OPTION_ROW_JSON,
@@ -205,16 +205,14 @@ static const Option rest_make_options[] = {
      .help = "Edge in particle diameters (default 12: 2171 points)"},
     {0, "seed", "S", OPTION_INTEGER, AT(seed), .min = 0, .max = 2147483647,
      .help = "Which of the arrangements (default 1, the one that comes with the program)"},
-    {0, "threads", "N", OPTION_INTEGER, AT(threads), .min = 1, .max = 1024,
-     .help = "Threads (default: one for each core). The result does not depend on it"},
+    OPTION_ROW_THREADS,
     OPTION_ROW_JSON,
     OPTION_ROW_HELP,
 };
 
 static const Option rest_surface_options[] = {
     {'o', "output", "FILE", OPTION_TEXT, AT(output), .help = "Write the surface (default: measure it only)"},
-    {0, "threads", "N", OPTION_INTEGER, AT(threads), .min = 1, .max = 1024,
-     .help = "Threads (default: one for each core). The result does not depend on it"},
+    OPTION_ROW_THREADS,
     OPTION_ROW_JSON,
     OPTION_ROW_HELP,
 };
@@ -430,8 +428,9 @@ static void print_main_help(void) {
 }
 
 static void print_command_help(const Command *command) {
-    printf("skiff %s: %s\n\nUsage: skiff %s %s [OPTION]...\n\n%s\nOptions:\n", command->name,
-           command->summary, command->name, command->arguments, command->details);
+    printf("skiff %s: %s\n\nUsage: skiff %s%s%s [OPTION]...\n\n%s\nOptions:\n", command->name,
+           command->summary, command->name, *command->arguments ? " " : "", command->arguments,
+           command->details);
     for (int i = 0; i < command->option_count; i++) {
         const Option *option = &command->options[i];
         char letter[8] = "    ", usage[64];
@@ -587,14 +586,14 @@ static bool parse(const Command *command, int argc, char **argv, CliArgs *args, 
                 return false;
         } else if (!command->operand) {
             return err_set(err, ERR_USAGE, "takes options only, \"%.200s\" is given", argv[i]);
-        } else if (args->scene) {
+        } else if (args->operand) {
             return err_set(err, ERR_USAGE, "one %s at a time: \"%.200s\" and \"%.200s\" are given",
-                           command->operand, args->scene, argv[i]);
+                           command->operand, args->operand, argv[i]);
         } else {
-            args->scene = argv[i];
+            args->operand = argv[i];
         }
     }
-    if (command->needs_operand && !args->scene && !args->help && !args->schema)
+    if (command->needs_operand && !args->operand && !args->help && !args->schema)
         return err_set(err, ERR_USAGE, "the %s is missing", command->operand);
     return true;
 }

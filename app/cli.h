@@ -16,12 +16,12 @@ typedef struct CliPictures {
 
 /* What the command line said. Options that a command does not have keep their defaults. */
 typedef struct CliArgs {
-    const char *scene;  /* what a command is about, mostly a scene; NULL: left out where it may be */
-    const char *input;  /* --input; NULL: not given */
-    const char *output; /* -o; NULL: not given */
-    double duration;    /* s; NaN: the scene's */
-    int threads;        /* 0: one for each core */
-    int simd;           /* SkiffSimd */
+    const char *operand; /* what a command is about: a scene, a folder...; NULL: left out where it may be */
+    const char *input;   /* --input; NULL: not given */
+    const char *output;  /* -o; NULL: not given */
+    double duration;     /* s; NaN: the scene's */
+    int threads;         /* 0: one for each core */
+    int simd;            /* SkiffSimd */
     const char *edits[CLI_MAX_EDITS]; /* --set, in order */
     int edit_count;
     bool force, resume, quiet;

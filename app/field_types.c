@@ -356,6 +356,12 @@ static void read_file(const Field *field, const json_t *value, void *member, Fie
         snprintf(path, sizeof path, "%s/%s", reader->folder, name);
     const char *result =
         realpath(path, full) ? full : path; /* a missing file is reported by whoever reads it */
+    json_t *kept = json_string(result);
+    json_decref(kept);
+    if (!kept) {
+        problems_add(reader->problems, "the name of its folder is not UTF-8 text, which scene.json must be");
+        return;
+    }
     size_t size = strlen(result) + 1;
     char *copy = pool_alloc(reader->pool, size);
     memcpy(copy, result, size);

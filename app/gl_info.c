@@ -7,7 +7,7 @@
 
 bool gl_info_command(const CliArgs *args, Err *err) {
     GfxDef def = gfx_def_default();
-    /* The option's words and the renderer's are in one order; test_picture_options holds them together. */
+    /* The option's words and the renderer's are in one order; test_pictures holds them together. */
     def.backend = (GfxBackend)(args->pictures.gl >= 0 ? args->pictures.gl : GFX_BACKEND_AUTO);
     def.width = def.height = GFX_SIZE_MIN;
     Gfx *gfx = gfx_create(&def, err);

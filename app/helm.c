@@ -5,9 +5,11 @@
  *   rudder amidships and holds. */
 #include "helm.h"
 
+#include "engine/base/angle.h"
+
 #include <string.h>
 
-static const double degree = 3.14159265358979323846 / 180;
+static const double degree = pi / 180;
 
 /* Steps begin at sums of rounded time steps: an event at 3 s must not miss the step at 2.9999999999 s. */
 static const double slack = 1e-9;

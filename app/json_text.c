@@ -25,6 +25,17 @@ json_t *json_text_double(double value) {
     return isfinite(value) ? json_real(value) : json_null();
 }
 
+json_t *json_text_string(const char *text) {
+    json_t *value = json_string(text);
+    char *plain = value ? NULL : strdup(text);
+    for (char *c = plain; c && *c; c++)
+        *c = (unsigned char)*c < 128 ? *c : '?';
+    if (plain)
+        value = json_string(plain);
+    free(plain);
+    return value;
+}
+
 static void print_real(FILE *stream, double value) {
     char text[40];
     bool is_whole = fabs(value) < 1e15 && value == floor(value);

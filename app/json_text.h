@@ -12,6 +12,8 @@
 json_t *json_text_float(float value);
 /* null when not finite. */
 json_t *json_text_double(double value);
+/* Names of files may be no UTF-8, which JSON must be: then each byte beyond ASCII becomes a question mark. */
+json_t *json_text_string(const char *text);
 
 /* indent < 0: all on one line, without a newline at the end. */
 void json_text_print(FILE *stream, const json_t *value, int indent);

@@ -14,7 +14,7 @@ typedef struct Ocean {
                     takes the place of old */
     float shift[2]; /* m, x and z: from the window's middle to that body */
     float band[2];  /* m from the edge of the window shifted by that: particles count for nothing nearer to it
-                       than  [0], alone beyond [1] */
+                       than [0], alone beyond [1] */
 } Ocean;
 
 /* `frame` is the first one. ERR_INPUT when memory is exhausted. */

@@ -49,6 +49,8 @@ bool pilot_read(Pilot *pilot, const Scene *scene, const char *file, const char *
         pilot->file = file_exists(pilot->path) ? pilot->path : NULL;
     } else {
         pilot->file = file ? file : scene->input;
+        if (!file && pilot->file && !file_exists(pilot->file))
+            return err_set(err, ERR_INPUT, "%s: input: there is no file %s", scene->file, pilot->file);
     }
     return !pilot->file ||
            (read_script(pilot->file, scene, &pilot->text, &pilot->size, &pilot->script, err) &&

@@ -335,7 +335,7 @@ static void print_profile(const Profile *profile) {
 bool profile_command(const CliArgs *args, Err *err) {
     char path[4096];
     CsvTable steps;
-    snprintf(path, sizeof path, "%.4000s/steps.csv", args->scene);
+    snprintf(path, sizeof path, "%.4000s/steps.csv", args->operand);
     if (!csv_read(path, &steps, err))
         return false;
     Profile *profile = malloc(sizeof *profile);

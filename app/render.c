@@ -34,7 +34,7 @@ typedef struct Redraw {
 } Redraw;
 
 static const char *saved_path(const Redraw *redraw, int number, char path[PATH_SIZE]) {
-    return frame_path(redraw->args->scene, "particles", number, "skiff", PATH_SIZE, path);
+    return frame_path(redraw->args->operand, "particles", number, "skiff", PATH_SIZE, path);
 }
 
 static bool exports(const CliArgs *args) {
@@ -44,24 +44,24 @@ static bool exports(const CliArgs *args) {
 static bool check_args(Redraw *redraw, Err *err) {
     const CliArgs *args = redraw->args;
     struct stat status;
-    if (stat(args->scene, &status) != 0)
-        return err_set(err, ERR_INPUT, "%s: cannot open: %s", args->scene, strerror(errno));
+    if (stat(args->operand, &status) != 0)
+        return err_set(err, ERR_INPUT, "%s: cannot open: %s", args->operand, strerror(errno));
     if (!S_ISDIR(status.st_mode))
-        return err_set(err, ERR_INPUT, "%s: is not the folder of a run", args->scene);
+        return err_set(err, ERR_INPUT, "%s: is not the folder of a run", args->operand);
     if (args->output)
         snprintf(redraw->output, sizeof redraw->output, "%.4000s", args->output);
     else
-        snprintf(redraw->output, sizeof redraw->output, "%.4000s/%s", args->scene,
+        snprintf(redraw->output, sizeof redraw->output, "%.4000s/%s", args->operand,
                  exports(args) ? "export" : "redrawn");
     if (!args->force && file_exists(redraw->output))
         return err_set(err, ERR_USAGE, "%s: the folder exists; --force replaces its results", redraw->output);
-    redraw->last = frames_last(args->scene, "particles", "skiff");
+    redraw->last = frames_last(args->operand, "particles", "skiff");
     if (redraw->last == 0)
         return err_set(err, ERR_INPUT,
                        "%s/particles: there are no saved particles; `skiff run` saves them with "
                        "--save-particles FPS",
-                       args->scene);
-    return true;
+                       args->operand);
+    return file_check_directory(redraw->output, err);
 }
 
 /* The saved frames say how many of them a second there are; a film of them has that rate. */
@@ -79,7 +79,7 @@ static bool read_rate(Redraw *redraw, Err *err) {
 static bool begin(Redraw *redraw, Err *err) {
     char path[PATH_SIZE];
     const CliArgs *args = redraw->args;
-    snprintf(path, sizeof path, "%.4000s/scene.json", args->scene);
+    snprintf(path, sizeof path, "%.4000s/scene.json", args->operand);
     redraw->scene = scene_load(path, NULL, 0, err);
     if (!redraw->scene || !view_options_make(&redraw->options, args, redraw->scene, err) ||
         !read_rate(redraw, err))

@@ -5,6 +5,7 @@
 #include "html.h"
 #include "svg.h"
 
+#include "engine/base/angle.h"
 #include "engine/base/file.h"
 
 #include <math.h>
@@ -341,7 +342,7 @@ static void write_body_table(FILE *out, const SkiffSim *sim) {
     for (int i = 0; i < count; i++) {
         SkiffBody body = skiff_body(sim, i);
         const double *v = body.velocity, *q = body.rotation;
-        double turned = 2 * acos(fmin(fabs(q[3]), 1)) * 180 / 3.14159265358979323846; /* since the start */
+        double turned = 2 * acos(fmin(fabs(q[3]), 1)) * 180 / pi; /* since the start */
         fputs("<tr><td>", out);
         svg_text(out, body.name);
         fprintf(out,

@@ -12,9 +12,11 @@
 #include "reproduce.h"
 #include "svg.h"
 
+#include "engine/base/angle.h"
 #include "engine/base/file.h"
 
 #include <assert.h>
+#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -52,18 +54,26 @@ double reproduce_radius(const CliArgs *args) {
 Scene *reproduce_scene(const ReproduceJob *job, const char *name, double duration, const char *const *edits,
                        int edit_count, Err *err) {
     enum { OWN = 3, MAX = 8 };
-    static const double paper_step = 0.003; /* s */
     const double radius = reproduce_radius(job->args);
     char texts[OWN][64];
     const char *all[MAX] = {texts[0], texts[1], texts[2]};
     assert(OWN + edit_count <= MAX);
     snprintf(texts[0], sizeof texts[0], "particleRadius=%.9g", radius);
-    snprintf(texts[1], sizeof texts[1], "timeStepSize=%.9g", paper_step * radius / CARENSAC_RADIUS);
+    snprintf(texts[1], sizeof texts[1], "timeStepSize=%.9g", carensac_time_step(radius));
     snprintf(texts[2], sizeof texts[2], "duration=%.9g",
              isnan(job->args->duration) ? duration : job->args->duration);
     for (int k = 0; k < edit_count; k++)
         all[OWN + k] = edits[k];
     return carried_scene(name, all, OWN + edit_count, err);
+}
+
+void reproduce_keep_layer(const Scene *shipped, double radius,
+                          char edits[REPRODUCE_LAYER_EDITS][REPRODUCE_EDIT_SIZE]) {
+    const SkiffParams *params = &shipped->def.params;
+    const float outflow = params->outflow_distance * params->particle_radius;
+    const float inflow = params->inflow_layer * params->particle_radius;
+    snprintf(edits[0], REPRODUCE_EDIT_SIZE, "outflowDistance=%.9g", (double)outflow / radius);
+    snprintf(edits[1], REPRODUCE_EDIT_SIZE, "inflowLayer=%.9g", (double)inflow / radius);
 }
 
 void reproduce_tell(const ReproduceJob *job, const char *row, const SkiffSim *sim, double end) {
@@ -219,7 +229,7 @@ static bool add_sample(Reproduction *run, int row, const SkiffSim *sim, double s
     const SkiffBody body = skiff_body(sim, 0);
     const double *q = body.rotation, sine = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]);
     /* The rotation vector; small angles about x and z are roll, about the submerged edge, and pitch. */
-    const double factor = sine > 0 ? 2 * atan2(sine, q[3]) / sine * 180 / 3.14159265358979323846 : 0;
+    const double factor = sine > 0 ? 2 * atan2(sine, q[3]) / sine * 180 / pi : 0;
     const double values[4] = {skiff_time(sim),
                               (body.position[1] - start_height) / (double)skiff_params(sim)->particle_radius,
                               factor * q[0], factor * q[2]};
@@ -467,7 +477,7 @@ enum { EXPERIMENT_COUNT = sizeof experiments / sizeof *experiments };
 
 /* The sheets of what the user asked for. */
 static bool choose(Reproduction *run, Err *err) {
-    const char *wanted = run->args->scene ? run->args->scene : "all";
+    const char *wanted = run->args->operand ? run->args->operand : "all";
     const bool all = strcmp(wanted, "all") == 0;
     bool known = all;
     for (int e = 0; e < EXPERIMENT_COUNT; e++) {
@@ -477,8 +487,13 @@ static bool choose(Reproduction *run, Err *err) {
         if (!carensac_sheet(experiments[e].sheet, &run->sheets[experiments[e].sheet], err))
             return false;
     }
-    return known || err_set(err, ERR_USAGE,
-                            "expected table1, fig2, fig4c, fig5, boat or all, found \"%.80s\"", wanted);
+    if (known)
+        return true;
+    char names[128] = "";
+    for (int e = 0; e < EXPERIMENT_COUNT; e++)
+        snprintf(names + strlen(names), sizeof names - strlen(names), "%s%s", e > 0 ? ", " : "",
+                 experiments[e].name);
+    return err_set(err, ERR_USAGE, "expected %s or all, found \"%.80s\"", names, wanted);
 }
 
 /* The results' folder, or without one a temporary folder for the set-ups' meshes. */
@@ -489,7 +504,8 @@ static bool prepare_folder(Reproduction *run, Err *err) {
     }
     const char *temporary = getenv("TMPDIR");
     snprintf(run->folder, sizeof run->folder, "%.4000s/skiff-XXXXXX", temporary ? temporary : "/tmp");
-    return mkdtemp(run->folder) || err_set(err, ERR_IO, "%s: cannot be created", run->folder);
+    return mkdtemp(run->folder) ||
+           err_set(err, ERR_IO, "%s: cannot make directory: %s", run->folder, strerror(errno));
 }
 
 bool reproduce_carensac_command(const CliArgs *args, Err *err) {

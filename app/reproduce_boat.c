@@ -7,6 +7,8 @@
 #include "reproduce.h"
 #include "svg.h"
 
+#include "engine/base/angle.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -43,11 +45,10 @@ static bool make_series(Series *series, Err *err) {
     return series_make(series, text, err);
 }
 
-/* Degrees by which the bow, on the body's -x side, stands higher than in its own axes. */
-static double bow_up(const SkiffBody *boat) {
+double reproduce_bow_up(const SkiffBody *boat) {
     const double *q = boat->rotation;
     const double rise = -2 * (q[0] * q[1] + q[2] * q[3]); /* y of the turned -x axis */
-    return asin(fmax(-1, fmin(1, rise))) * 180 / 3.14159265358979323846;
+    return asin(fmax(-1, fmin(1, rise))) * 180 / pi;
 }
 
 static bool add_row(Series *series, const SkiffSim *sim, Err *err) {
@@ -65,7 +66,7 @@ static bool add_row(Series *series, const SkiffSim *sim, Err *err) {
     row[MOVED] = stats->moved;
     row[STEP_MS] = stats->step_ms;
     row[SPEED] = sqrt(boat.velocity[0] * boat.velocity[0] + boat.velocity[2] * boat.velocity[2]);
-    row[BOW_UP] = bow_up(&boat);
+    row[BOW_UP] = reproduce_bow_up(&boat);
     for (int p = 0; p < SKIFF_PHASE_COUNT; p++)
         row[FIRST_PHASE + p] = stats->phase_ms[p];
     return true;

@@ -20,20 +20,22 @@ static const char header[] = "t,closed_energy,absorbing_energy,closed_particles,
 static const char *const side_names[SIDE_COUNT] = {"closed end", "absorbing end"};
 
 static const double standard_duration = 6.6;
-static const double layer = 0.5; /* m, in which the scene absorbs */
 /* Between these times (s) the closed half has its least energy, while its first wave stands at the end. The
  * wave is back ("at around 2.1 s") within `reflection_span` of that. */
 static const double turn_from = 1.5, turn_to = 2.2, reflection_span = 0.8;
 static const double end_time = 5.9, end_span = 0.1; /* s; means over the span around the time */
 
+static const char scene_file[] = "wedge.json";
+
 static Scene *load(const ReproduceJob *job, Err *err) {
-    const double radius = reproduce_radius(job->args);
-    char texts[2][64];
-    /* it keeps its thickness, whatever the particles' size */
-    snprintf(texts[0], sizeof texts[0], "outflowDistance=%.9g", layer / radius);
-    snprintf(texts[1], sizeof texts[1], "inflowLayer=%.9g", layer / radius);
-    const char *const edits[] = {texts[0], texts[1]};
-    return reproduce_scene(job, "wedge.json", standard_duration, edits, 2, err);
+    char texts[REPRODUCE_LAYER_EDITS][REPRODUCE_EDIT_SIZE];
+    const char *const edits[REPRODUCE_LAYER_EDITS] = {texts[0], texts[1]};
+    Scene *shipped = carried_scene(scene_file, NULL, 0, err);
+    if (!shipped)
+        return NULL;
+    reproduce_keep_layer(shipped, reproduce_radius(job->args), texts);
+    scene_free(shipped);
+    return reproduce_scene(job, scene_file, standard_duration, edits, REPRODUCE_LAYER_EDITS, err);
 }
 
 static bool add_row(Series *series, const SkiffSim *sim, double *gauges, Err *err) {

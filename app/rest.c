@@ -88,6 +88,17 @@ static bool print_quality(const SkiffTile *tile, bool as_json, Err *err) {
     return true;
 }
 
+/* Said before the work that would be lost. */
+static bool check_output(const CliArgs *args, Err *err) {
+    FileWriter writer;
+    if (!args->output)
+        return true;
+    if (!file_begin(&writer, args->output, err))
+        return false;
+    file_abort(&writer);
+    return true;
+}
+
 /* Saves where that is wanted, measures, and ends the tile. False as well when there is none. */
 static bool finish_tile(SkiffTile *tile, const CliArgs *args, Err *err) {
     bool good = tile && (!args->output || skiff_tile_save(tile, args->output, err)) &&
@@ -103,15 +114,15 @@ bool rest_make_command(const CliArgs *args, Err *err) {
     def.edge = args->edge;
     def.seed = (uint64_t)args->seed;
     def.threads = args->threads;
-    return finish_tile(skiff_tile_make(&def, err), args, err);
+    return check_output(args, err) && finish_tile(skiff_tile_make(&def, err), args, err);
 }
 
 bool rest_surface_command(const CliArgs *args, Err *err) {
-    return finish_tile(skiff_tile_surface(args->threads, err), args, err);
+    return check_output(args, err) && finish_tile(skiff_tile_surface(args->threads, err), args, err);
 }
 
 bool rest_show_command(const CliArgs *args, Err *err) {
-    return finish_tile(skiff_tile_open(args->scene, err), args, err);
+    return finish_tile(skiff_tile_open(args->operand, err), args, err);
 }
 
 /* Where the user gave no corner: two support radii inside the outermost particles, past what walls and
@@ -128,10 +139,11 @@ static bool find_box(const CliArgs *args, const SkiffSim *sim, double min[3], do
         min[k] = isnan(args->min[k]) ? (double)low + particles.origin[k] + margin : args->min[k];
         max[k] = isnan(args->max[k]) ? (double)high + particles.origin[k] - margin : args->max[k];
         if (!(min[k] < max[k]))
-            return err_set(
-                err, ERR_INPUT,
-                "%s: nothing to cut: the box that --min and --max give reaches from %g to %g m in %c",
-                args->scene, min[k], max[k], "xyz"[k]);
+            return err_set(err, ERR_INPUT,
+                           "%s: nothing to cut: the box reaches from %g to %g m in %c (--min, --max; by "
+                           "default %g m, two "
+                           "support radii, inside the outermost particles)",
+                           args->operand, min[k], max[k], "xyz"[k], margin);
     }
     return true;
 }
@@ -140,10 +152,12 @@ bool rest_cut_command(const CliArgs *args, Err *err) {
     char scene_path[4096], state_path[4096];
     if (!args->output)
         return err_set(err, ERR_USAGE, "-o FILE is missing");
-    if (!file_exists(args->scene))
-        return err_set(err, ERR_INPUT, "%s: there is no such folder", args->scene);
-    snprintf(scene_path, sizeof scene_path, "%.4000s/scene.json", args->scene);
-    snprintf(state_path, sizeof state_path, "%.4000s/state.skiff", args->scene);
+    if (!file_exists(args->operand))
+        return err_set(err, ERR_INPUT, "%s: there is no such folder", args->operand);
+    if (!check_output(args, err))
+        return false;
+    snprintf(scene_path, sizeof scene_path, "%.4000s/scene.json", args->operand);
+    snprintf(state_path, sizeof state_path, "%.4000s/state.skiff", args->operand);
     Scene *scene = scene_load(scene_path, NULL, 0, err);
     if (!scene)
         return false;
@@ -222,7 +236,7 @@ static void print_filled(const Filled *filled, bool as_json) {
 }
 
 bool rest_fill_command(const CliArgs *args, Err *err) {
-    Scene *scene = scene_load(args->scene, args->edits, args->edit_count, err);
+    Scene *scene = scene_load(args->operand, args->edits, args->edit_count, err);
     if (!scene)
         return false;
     SkiffSim *sim = scene_start(scene, args->threads, (SkiffSimd)args->simd, err);
@@ -235,7 +249,7 @@ bool rest_fill_command(const CliArgs *args, Err *err) {
                err_set(err, ERR_INPUT,
                        "%s: nothing in it is filled with water at rest at the start; a block is with --set "
                        "FluidBlocks[0].fill=rest",
-                       args->scene);
+                       args->operand);
     }
     good = good && let_go(sim, args->free_steps, &filled, err);
     if (good)

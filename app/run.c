@@ -27,7 +27,7 @@ static Scene *load_scene(const CliArgs *args, Err *err) {
         snprintf(duration, sizeof duration, "Configuration.duration=%.17g", args->duration);
         edits[count++] = duration;
     }
-    return scene_load(args->scene, edits, count, err);
+    return scene_load(args->operand, edits, count, err);
 }
 
 /* ---- The game loop ---- */
@@ -125,7 +125,8 @@ static bool run_scene(Run *run, Err *err) {
     log_set_sink(log_line, &run->progress, LOG_INFO);
     run->scene = load_scene(run->args, err);
     const char *folder = run->args->resume ? run->args->output : NULL;
-    if (!run->scene || !pilot_read(&run->pilot, run->scene, run->args->input, folder, err))
+    if (!run->scene || (folder && !run_check_resume(run, err)) ||
+        !pilot_read(&run->pilot, run->scene, run->args->input, folder, err))
         return false;
     run->sim = scene_start(run->scene, run->args->threads, (SkiffSimd)run->args->simd, err);
     if (!run->sim)

@@ -43,7 +43,7 @@ bool run_check_args(const CliArgs *args, Err *err) {
             args->output);
     if (!exists && args->resume)
         return err_set(err, ERR_USAGE, "%s: there is no such folder to resume", args->output);
-    return true;
+    return file_check_directory(args->output, err);
 }
 
 /* First place where two documents differ, as a path. */
@@ -99,12 +99,17 @@ static bool check_same_scene(const Run *run, Err *err) {
                    run->scene->file, path, *place ? place : "its top");
 }
 
-static bool resume(Run *run, Err *err) {
+bool run_check_resume(const Run *run, Err *err) {
     char path[PATH_SIZE];
     if (!file_exists(run_path(run, "state.skiff", path)))
         return err_set(err, ERR_INPUT, "%s: there is no checkpoint to resume from; start again with --force",
                        path);
-    return check_same_scene(run, err) && skiff_load(run->sim, path, err) &&
+    return check_same_scene(run, err);
+}
+
+static bool resume(Run *run, Err *err) {
+    char path[PATH_SIZE];
+    return skiff_load(run->sim, run_path(run, "state.skiff", path), err) &&
            pilot_resume(&run->pilot, run->scene, run->args->output, run->sim, err) &&
            tables_resume(&run->tables, run->args->output, run->sim, run->scene->probe_rate, err);
 }

@@ -22,8 +22,11 @@ typedef struct Run {
     double next_flush, next_checkpoint; /* s, wall clock */
 } Run;
 
-/* Whether the options fit what the output folder is. Changes nothing. */
+/* Whether the options fit what the output folder is, and files can be written there. Changes nothing. */
 bool run_check_args(const CliArgs *args, Err *err);
+/* Whether the folder holds a checkpoint of a run of this scene: what can be said before the scene becomes a
+ * simulation. ERR_INPUT. */
+bool run_check_resume(const Run *run, Err *err);
 /* Begins the files of a new run, or loads the checkpoint and cuts the files back to it. */
 bool run_begin(Run *run, Err *err);
 /* Gives all rows to the operating system, and to the disk if `durable`. */

@@ -217,9 +217,9 @@ static json_t *parse_document(const char *file, const char *text, size_t size, E
 
 static char *folder_of(const char *file, Pool *pool) {
     const char *slash = strrchr(file, '/');
-    size_t count = slash ? (size_t)(slash - file) + 1 : 2;
+    size_t count = slash ? (size_t)(slash - file) : 1;
     char *folder = pool_alloc(pool, count + 1);
-    memcpy(folder, slash ? file : "./", count);
+    memcpy(folder, slash ? file : ".", count);
     return folder;
 }
 

@@ -2,6 +2,7 @@
 #include "scene_rows.h"
 
 #include <stdio.h>
+#include <string.h>
 
 SceneRender scene_render_default(void) {
     return (SceneRender){.fps = 30,
@@ -142,10 +143,11 @@ static const ObjectType material_type = {.help = "What a body is made of",
 static const Field render_fields[] = {
     {ROW(FIELD_INT, SceneRender, fps, "fps"), .min = 1, .max = 1000, .unit = "1/s",
      .help = "Frames a second of simulated time; the step need not fit"},
-    {ROW(FIELD_INT, SceneRender, width, "width"), .min = 16, .max = 8192, .unit = "px", .help = "Of a frame"},
-    {ROW(FIELD_INT, SceneRender, height, "height"), .min = 16, .max = 8192, .unit = "px",
-     .help = "Of a frame"},
-    {ROW(FIELD_INT, SceneRender, supersample, "supersample"), .min = 1, .max = 4,
+    {ROW(FIELD_INT, SceneRender, width, "width"), .min = RENDER_SIZE_MIN, .max = RENDER_SIZE_MAX,
+     .unit = "px", .help = "Of a frame"},
+    {ROW(FIELD_INT, SceneRender, height, "height"), .min = RENDER_SIZE_MIN, .max = RENDER_SIZE_MAX,
+     .unit = "px", .help = "Of a frame"},
+    {ROW(FIELD_INT, SceneRender, supersample, "supersample"), .min = 1, .max = RENDER_SUPERSAMPLE_MAX,
      .help = "Drawn that many times larger, then averaged"},
     {ROW(FIELD_ENUM, SceneRender, look, "look"), .names = RENDER_LOOKS,
      .help = "A water surface, or spheres"},
@@ -186,13 +188,32 @@ const ObjectType scene_render_type = {.help = "How frames are drawn. Present: `s
                                       .rules = render_rules,
                                       .rule_count = COUNT(render_rules)};
 
+static size_t append_name(char *out, size_t size, size_t length, const char *name, size_t width) {
+    return length + (size_t)snprintf(out ? out + length : NULL, out ? size - length : 0, "%s%.*s",
+                                     length > 0 ? "|" : "", (int)width, name);
+}
+
+static bool is_taken(const FieldList *cameras, const char *name, size_t width) {
+    for (int i = 0; i < cameras->count; i++) {
+        const char *other = ((const SceneCamera *)cameras->items)[i].name;
+        if (strlen(other) == width && memcmp(other, name, width) == 0)
+            return true;
+    }
+    return false;
+}
+
 size_t scene_camera_names(const SceneRender *render, char *out, size_t size) {
     const FieldList none = {0}, *list = render ? &render->cameras : &none;
     size_t length = 0;
     for (int i = 0; i < list->count; i++) {
         const char *name = ((const SceneCamera *)list->items)[i].name;
-        length += (size_t)snprintf(out ? out + length : NULL, out ? size - length : 0, "%s|", name);
+        length = append_name(out, size, length, name, strlen(name));
     }
-    return length +
-           (size_t)snprintf(out ? out + length : NULL, out ? size - length : 0, "%s", RENDER_CAMERAS);
+    for (const char *kind = RENDER_CAMERAS; *kind;) {
+        const size_t width = strcspn(kind, "|");
+        if (!is_taken(list, kind, width))
+            length = append_name(out, size, length, kind, width);
+        kind += width + (kind[width] == '|');
+    }
+    return length;
 }

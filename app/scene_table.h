@@ -73,11 +73,14 @@ typedef struct SceneProbe {
     float min[3], max[3]; /* NaN: absent */
 } SceneProbe;
 
-/* Names of enumerations that the command line knows too. view.c turns positions into the renderer's. */
+/* Names of enumerations that the command line knows too. Looks and cameras are in the renderer's order. */
 #define RENDER_LOOKS   "water|particles"
 #define RENDER_FIELDS  "speed|density|pressure|age|window"
 #define RENDER_HUDS    "off|on|timing"
 #define RENDER_CAMERAS "chase|fixed|orbit|top|bow"
+
+/* The renderer's limits: view_picture.c holds them together. */
+enum { RENDER_SIZE_MIN = 16, RENDER_SIZE_MAX = 8192, RENDER_SUPERSAMPLE_MAX = 4 };
 
 typedef enum RenderField {
     RENDER_SPEED,
@@ -153,8 +156,9 @@ extern const ObjectType scene_file_type;
 
 /* What an empty section "Render" means. */
 SceneRender scene_render_default(void);
-/* Names of all cameras, "a|b|c": those of `render` (NULL: none), then those that always exist,
- * RENDER_CAMERAS. Returns the length; writes nothing where out is NULL, else size is at least the length + 1.
+/* Names of all cameras, "a|b|c": those of `render` (NULL: none), then those of
+ * RENDER_CAMERAS, which always exist, unless one of these has its name. Returns the length; writes nothing
+ * where out is NULL, else size is at least the length + 1.
  */
 size_t scene_camera_names(const SceneRender *render, char *out, size_t size);
 /* A camera of which nothing is said. */

@@ -3,6 +3,7 @@
 #include "sheet.h"
 
 #include "json_text.h"
+#include "summary.h"
 #include "svg.h"
 
 #include "engine/base/file.h"
@@ -60,17 +61,6 @@ bool sheet_add_run(Sheet *sheet, int row_index, const double *values, Err *err) 
 
 /* ---- Figures ---- */
 
-static int compare_doubles(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-/* Value below which a share of the sorted values lies, by nearest rank. */
-static double quantile(const double *sorted, size_t count, double share) {
-    const double rank = ceil(share * (double)count);
-    return sorted[rank < 1 ? 0 : (size_t)rank - 1];
-}
-
 static SheetFigure own_figure(const Sheet *sheet, const SheetRow *row, int column) {
     SheetFigure figure = {NAN, NAN, NAN};
     double *sorted = malloc(((size_t)row->run_count + 1) * sizeof *sorted);
@@ -81,9 +71,9 @@ static SheetFigure own_figure(const Sheet *sheet, const SheetRow *row, int colum
             sorted[count++] = value;
     }
     if (count > 0) {
-        qsort(sorted, count, sizeof *sorted, compare_doubles);
-        figure = (SheetFigure){quantile(sorted, count, 0.5), quantile(sorted, count, 0.25),
-                               quantile(sorted, count, 0.75)};
+        summary_sort(sorted, count);
+        figure = (SheetFigure){summary_percentile(sorted, count, 50), summary_percentile(sorted, count, 25),
+                               summary_percentile(sorted, count, 75)};
     }
     free(sorted);
     return figure;

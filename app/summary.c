@@ -48,7 +48,9 @@ json_t *summary_figure(double value) {
     return json_text_double(strtod(text, NULL));
 }
 
-json_t *summary_statistics(double *values, size_t count) {
+/* {"mean":, "p50":, "p95":, "p99":, "max":} of count values, whose order is lost. Percentiles by nearest
+ * rank. New reference. */
+static json_t *statistics(double *values, size_t count) {
     if (count == 0)
         return json_null();
     double sum = 0;
@@ -75,7 +77,7 @@ uint32_t summary_sample_count(const SkiffSim *sim) {
 
 static void add_column(json_t *into, const char *key, const CsvTable *steps, const char *column) {
     double *values = csv_copy_column(steps, column);
-    json_object_set_new(into, key, values ? summary_statistics(values, steps->row_count) : json_null());
+    json_object_set_new(into, key, values ? statistics(values, steps->row_count) : json_null());
     free(values);
 }
 
@@ -134,8 +136,9 @@ json_t *summary_make(const Scene *scene, const SkiffSim *sim, const CsvTable *st
     snprintf(hash, sizeof hash, "%016" PRIx64, skiff_hash(sim));
     double computed_ms = column_sum(steps, "step_ms");
     double simulated = skiff_time(sim) - scene->def.start_time;
-    json_t *summary = json_pack("{ssssssssso}", "scene", scene->file, "title", scene->title, "status",
-                                end->status, "message", end->message, "state_hash", json_string(hash));
+    json_t *summary =
+        json_pack("{sossssso so}", "scene", json_text_string(scene->file), "title", scene->title, "status",
+                  end->status, "message", json_text_string(end->message), "state_hash", json_string(hash));
     json_object_set_new(summary, "steps", json_integer((json_int_t)skiff_step_count(sim)));
     json_object_set_new(summary, "time", json_text_double(skiff_time(sim)));
     json_object_set_new(summary, "time_step", json_text_float(skiff_params(sim)->time_step));

@@ -15,10 +15,6 @@ typedef struct RunEnd {
 json_t *summary_make(const Scene *scene, const SkiffSim *sim, const CsvTable *steps, const CsvTable *ledger,
                      const RunEnd *end);
 
-/* {"mean":, "p50":, "p95":, "p99":, "max":} of count values, whose order is lost. Percentiles by nearest
- * rank. New reference. */
-json_t *summary_statistics(double *values, size_t count);
-
 void summary_sort(double *values, size_t count); /* ascending */
 /* Nearest rank, of at least one value in ascending order. */
 double summary_percentile(const double *sorted, size_t count, double percent);

@@ -1,4 +1,5 @@
-/* Pictures of a simulation: the one module that knows both the engine and the renderer. */
+/* Pictures of a simulation as it runs: which frames are due, and where they go. The files
+ * view*.c are all that know both the engine and the renderer. */
 #ifndef SKIFF_APP_VIEW_H
 #define SKIFF_APP_VIEW_H
 
@@ -41,8 +42,5 @@ bool view_saved(View *view, const Frame *frame, int number, Err *err);
 bool view_finish(View *view, Err *err);
 /* Without view_finish the film is thrown away; frames are complete in any case. NULL is fine. */
 void view_destroy(View *view);
-
-/* Frames drawn so far, for a last message. */
-int view_frame_count(const View *view);
 
 #endif

@@ -18,7 +18,7 @@ static bool parse_pair(const char *text, char between, long least, long pair[2])
 }
 
 static bool set_size(const char *text, SceneRender *render, Err *err) {
-    enum { LEAST = 16, MOST = 8192 };
+    enum { LEAST = RENDER_SIZE_MIN, MOST = RENDER_SIZE_MAX };
     long pair[2];
     if (!parse_pair(text, 'x', LEAST, pair) || pair[0] > MOST || pair[1] > MOST)
         return err_set(err, ERR_USAGE, "--size: expected WIDTHxHEIGHT from %dx%d to %dx%d, found \"%.80s\"",

@@ -6,7 +6,7 @@
 #include "scene.h"
 #include "scene_table.h"
 
-#define VIEW_BACKENDS "auto|egl-device|egl|osmesa"
+#define VIEW_BACKENDS "auto|egl-device|egl|osmesa" /* in the renderer's order */
 #define VIEW_EXPORTS  "vtk|ply|bgeo"
 
 typedef struct ViewOptions {

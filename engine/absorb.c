@@ -54,17 +54,11 @@ static bool inlet_reserve(Sea *sea, uint32_t count, Err *err) {
 /* What the walls contribute to the density at an inlet: sum psi_b W, once for all. */
 static float wall_density(const SkiffSim *sim, const float p[3]) {
     const SampleSet *walls = &sim->boundary.fixed.sorted;
-    const CellGrid *grid = &walls->grid;
-    int32_t c[3];
-    for (int k = 0; k < 3; k++) {
-        c[k] = (int32_t)floorf((p[k] - grid->origin[k]) * grid->inv_size);
-        if (walls->count == 0 || c[k] < 1 || c[k] + 1 >= grid->size[k])
-            return 0.0f;
-    }
+    const int32_t cell = walls->count > 0 ? cell_grid_inner(&walls->grid, p) : -1;
     double sum = 0.0;
-    for (int run = 0; run < 9; run++) {
-        const int32_t cell = cell_grid_index(grid, c[0] + run / 3 - 1, c[1], c[2] + run % 3 - 1);
-        for (uint32_t s = grid->start[cell - 1]; s < grid->start[cell + 2]; s++) {
+    for (int run = 0; cell >= 0 && run < CELL_RUNS; run++) {
+        const CellRun near = cell_grid_run(&walls->grid, cell, run);
+        for (uint32_t s = near.begin; s < near.end; s++) {
             const float dx = p[0] - walls->x[s], dy = p[1] - walls->y[s], dz = p[2] - walls->z[s];
             sum += (double)(walls->volume[s] * kernel_w(&sim->kernel, sqrtf(dx * dx + dy * dy + dz * dz)));
         }
@@ -135,18 +129,12 @@ bool absorb_make(SkiffSim *sim, Err *err) {
 
 static bool body_is_near(const SkiffSim *sim, const float p[3], float distance) {
     const SampleSet *bodies = &sim->boundary.moving.sorted;
-    const CellGrid *grid = &bodies->grid;
-    int32_t c[3];
-    for (int k = 0; k < 3; k++) {
-        c[k] = bodies->count > 0 ? (int32_t)floorf((p[k] - grid->origin[k]) * grid->inv_size) : -1;
-        if (c[k] < 1 || c[k] + 1 >= grid->size[k])
-            return false;
-    }
-    if (!bodies->occupied[cell_grid_index(grid, c[0], c[1], c[2])])
+    const int32_t cell = bodies->count > 0 ? cell_grid_inner(&bodies->grid, p) : -1;
+    if (cell < 0 || !bodies->occupied[cell])
         return false;
-    for (int run = 0; run < 9; run++) {
-        const int32_t cell = cell_grid_index(grid, c[0] + run / 3 - 1, c[1], c[2] + run % 3 - 1);
-        for (uint32_t s = grid->start[cell - 1]; s < grid->start[cell + 2]; s++) {
+    for (int run = 0; run < CELL_RUNS; run++) {
+        const CellRun near = cell_grid_run(&bodies->grid, cell, run);
+        for (uint32_t s = near.begin; s < near.end; s++) {
             const float dx = p[0] - bodies->x[s], dy = p[1] - bodies->y[s], dz = p[2] - bodies->z[s];
             if (dx * dx + dy * dy + dz * dz < distance * distance)
                 return true;

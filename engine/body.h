@@ -42,13 +42,16 @@ void body_push(Body *body, const float gravity[3], double time, double dt);
 /* Moves by the velocities; free rotation keeps the angular momentum (the gyroscopic term), renormalises the
  * quaternion. */
 void body_advance(Body *body, double time, double dt);
+/* Is it kept still at that time: not yet released, or stopped? */
 bool body_held(const Body *body, double time);
 
 /* p (world, m) in body axes; returns the square of its distance from the box that holds the body there. After
  * body_prepare. */
 double body_box_distance_sq(const Body *body, const double p[3], float local[3]);
 
+/* Of a unit quaternion x y z w. */
 void quaternion_matrix(const double q[4], double m[3][3]);
+/* result may be v */
 void matrix_times(const double m[3][3], const double v[3], double result[3]);
 
 #endif

@@ -8,26 +8,24 @@
 #include <omp.h>
 #include <stdlib.h>
 
+/* Of BoundarySamples. */
+#define EACH_SAMPLE_ARRAY(DO) DO(position) DO(volume) DO(area) DO(normal) DO(surface) DO(object)
+
 static bool samples_grow(BoundarySamples *samples, uint32_t extra) {
     const uint32_t need = samples->count + extra;
     if (need <= samples->capacity)
         return true;
-    void *position = realloc(samples->position, need * sizeof *samples->position);
-    samples->position = position ? position : samples->position;
-    void *volume = realloc(samples->volume, need * sizeof *samples->volume);
-    samples->volume = volume ? volume : samples->volume;
-    void *area = realloc(samples->area, need * sizeof *samples->area);
-    samples->area = area ? area : samples->area;
-    void *normal = realloc(samples->normal, need * sizeof *samples->normal);
-    samples->normal = normal ? normal : samples->normal;
-    void *surface = realloc(samples->surface, need * sizeof *samples->surface);
-    samples->surface = surface ? surface : samples->surface;
-    void *object = realloc(samples->object, need * sizeof *samples->object);
-    samples->object = object ? object : samples->object;
-    if (!position || !volume || !area || !normal || !surface || !object)
-        return false;
-    samples->capacity = need;
-    return true;
+    bool good = true;
+#define GROW(field)                                                                                          \
+    {                                                                                                        \
+        void *grown = realloc(samples->field, need * sizeof *samples->field);                                \
+        samples->field = grown ? grown : samples->field;                                                     \
+        good = good && grown;                                                                                \
+    }
+    EACH_SAMPLE_ARRAY(GROW)
+#undef GROW
+    samples->capacity = good ? need : samples->capacity;
+    return good;
 }
 
 /* Displacements that move every face of the mesh by one unit along its normal: a vertex between faces goes
@@ -145,8 +143,8 @@ bool boundary_add(BoundarySet *set, const SurfaceDef *surface, Err *err) {
 
 static bool set_reserve(BoundarySet *set, size_t cells, Err *err) {
     const size_t padded = set->samples.count + SLICE;
-    /* x, y, z, volume, object, origin of the sorted samples, then their world positions */
-    if (!buffer_reserve(&set->buffer, "boundary samples", padded * (6 * sizeof(float) + sizeof(Float4)), err))
+    /* world positions and cells of the samples; x, y, z, volume, object, origin of the sorted ones */
+    if (!buffer_reserve(&set->buffer, "boundary samples", padded * (7 * sizeof(float) + sizeof(Float4)), err))
         return false;
     if (set->cells.size < (cells + 1) * sizeof(uint32_t) &&
         !buffer_reserve(&set->cells, "boundary cells", (cells + cells / 3 + 1) * sizeof(uint32_t), err))
@@ -163,14 +161,14 @@ static bool set_reserve(BoundarySet *set, size_t cells, Err *err) {
     set->sorted.volume = x + 3 * padded;
     set->sorted.object = (int32_t *)(x + 4 * padded);
     set->origin = (uint32_t *)(x + 5 * padded);
+    set->cell = (uint32_t *)(x + 6 * padded);
     set->sorted.grid.start = set->cells.data;
     set->sorted.occupied = set->occupied.data;
     return true;
 }
 
 static void mark_occupied(const CellGrid *grid, uint8_t *occupied) {
-    const size_t cells = (size_t)grid->size[0] * (size_t)grid->size[1] * (size_t)grid->size[2];
-    memset(occupied, 0, cells);
+    memset(occupied, 0, cell_grid_count(grid));
     for (int32_t x = 1; x + 1 < grid->size[0]; x++)
         for (int32_t z = 1; z + 1 < grid->size[2]; z++)
             for (int32_t y = 1; y + 1 < grid->size[1]; y++) {
@@ -190,7 +188,8 @@ static bool in_reach(const BoundarySet *set, uint32_t s) {
     return true;
 }
 
-bool boundary_sort(BoundarySet *set, float cell_size, Err *err) {
+/* Sorts a set's world positions into cells of edge h. */
+static bool sort_set(BoundarySet *set, float cell_size, Err *err) {
     const uint32_t count = set->samples.count;
     GridBounds bounds = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
     set->sorted.count = 0;
@@ -210,33 +209,24 @@ bool boundary_sort(BoundarySet *set, float cell_size, Err *err) {
         return err_set(err, ERR_DIVERGED, "the boundary samples spread over more than %d cells of %g m",
                        GRID_MAX_CELLS, (double)cell_size);
     const CellGrid *grid = &set->sorted.grid;
-    const size_t cells = (size_t)grid->size[0] * (size_t)grid->size[1] * (size_t)grid->size[2];
+    const size_t cells = cell_grid_count(grid);
     if (!set_reserve(set, cells, err))
         return false;
-    uint32_t *start = set->cells.data;
-    memset(start, 0, (cells + 1) * sizeof(uint32_t));
     for (uint32_t s = 0; s < count; s++)
-        if (in_reach(set, s))
-            start[grid_cell_of(grid, set->world[s]) + 1]++;
-    for (size_t c = 0; c < cells; c++)
-        start[c + 1] += start[c];
+        set->cell[s] = in_reach(set, s) ? grid_cell_of(grid, set->world[s]) : CELL_NONE;
     /* samples come grouped by object, and a stable sort keeps them so within a cell */
+    cell_grid_sort(set->cell, count, cells, set->cells.data, set->origin);
     float *x = (float *)set->sorted.x, *y = (float *)set->sorted.y, *z = (float *)set->sorted.z;
     float *volume = (float *)set->sorted.volume;
     int32_t *object = (int32_t *)set->sorted.object;
-    for (uint32_t s = 0; s < count; s++) {
-        if (!in_reach(set, s))
-            continue;
-        const uint32_t to = start[grid_cell_of(grid, set->world[s])]++;
+    for (uint32_t to = 0; to < set->sorted.count; to++) {
+        const uint32_t s = set->origin[to];
         x[to] = set->world[s][0];
         y[to] = set->world[s][1];
         z[to] = set->world[s][2];
         volume[to] = set->world[s][3];
         object[to] = set->samples.object[s];
-        set->origin[to] = s;
     }
-    memmove(start + 1, start, cells * sizeof(uint32_t));
-    start[0] = 0;
     mark_occupied(grid, set->occupied.data);
     return true;
 }
@@ -246,15 +236,14 @@ bool boundary_sort(BoundarySet *set, float cell_size, Err *err) {
 static void sample_volumes(BoundarySet *set, const Kernel *kernel) {
     const SampleSet *sorted = &set->sorted;
     const CellGrid *grid = &sorted->grid;
-    const int32_t column = grid->size[1], slab = grid->size[1] * grid->size[2];
 #pragma omp parallel for schedule(dynamic, 256)
     for (uint32_t s = 0; s < set->samples.count; s++) {
         const float *p = set->world[s];
         const int32_t cell = (int32_t)grid_cell_of(grid, p);
         double sum = 0.0;
-        for (int run = 0; run < 9; run++) {
-            const int32_t middle = cell + (run / 3 - 1) * slab + (run % 3 - 1) * column;
-            for (uint32_t b = grid->start[middle - 1]; b < grid->start[middle + 2]; b++) {
+        for (int run = 0; run < CELL_RUNS; run++) {
+            const CellRun near = cell_grid_run(grid, cell, run);
+            for (uint32_t b = near.begin; b < near.end; b++) {
                 const float dx = p[0] - sorted->x[b], dy = p[1] - sorted->y[b], dz = p[2] - sorted->z[b];
                 sum += (double)kernel_w(kernel, sqrtf(dx * dx + dy * dy + dz * dz));
             }
@@ -270,12 +259,12 @@ bool boundary_weigh(BoundarySet *set, const Kernel *kernel, Err *err) {
         return false;
     for (uint32_t s = 0; s < set->samples.count; s++)
         memcpy(set->world[s], set->samples.position[s], sizeof set->samples.position[s]);
-    if (!boundary_sort(set, kernel->support, err))
+    if (!sort_set(set, kernel->support, err))
         return false;
     sample_volumes(set, kernel);
     for (uint32_t s = 0; s < set->samples.count; s++)
         set->world[s][3] = set->samples.volume[s];
-    return boundary_sort(set, kernel->support, err); /* once more: the sorted copy takes the volumes along */
+    return sort_set(set, kernel->support, err); /* once more: the sorted copy takes the volumes along */
 }
 
 bool boundary_append(BoundarySet *set, const BoundarySamples *more, Err *err) {
@@ -283,12 +272,9 @@ bool boundary_append(BoundarySet *set, const BoundarySamples *more, Err *err) {
     if (!samples_grow(samples, more->count))
         return err_add(err, ERR_INPUT, "no memory for %u boundary samples", more->count);
     const uint32_t to = samples->count;
-    memcpy(samples->position + to, more->position, more->count * sizeof *more->position);
-    memcpy(samples->volume + to, more->volume, more->count * sizeof *more->volume);
-    memcpy(samples->area + to, more->area, more->count * sizeof *more->area);
-    memcpy(samples->normal + to, more->normal, more->count * sizeof *more->normal);
-    memcpy(samples->surface + to, more->surface, more->count * sizeof *more->surface);
-    memcpy(samples->object + to, more->object, more->count * sizeof *more->object);
+#define COPY(field) memcpy(samples->field + to, more->field, more->count * sizeof *more->field);
+    EACH_SAMPLE_ARRAY(COPY)
+#undef COPY
     samples->count += more->count;
     return true;
 }
@@ -341,7 +327,7 @@ bool boundary_place(Boundary *boundary, const Body *bodies, int body_count, cons
             set->world[s][k] = (float)(world[k] + (body->position[k] - origin[k]));
         set->world[s][3] = set->samples.volume[s];
     }
-    return boundary_sort(set, cell_size, err);
+    return sort_set(set, cell_size, err);
 }
 
 /* One try: contacts of every block, appended to the common list. False: a particle touches too many objects
@@ -441,12 +427,9 @@ void boundary_impulse(const Boundary *boundary, const float *p, size_t stride, u
 }
 
 void boundary_set_free(BoundarySet *set) {
-    free(set->samples.position);
-    free(set->samples.volume);
-    free(set->samples.area);
-    free(set->samples.normal);
-    free(set->samples.surface);
-    free(set->samples.object);
+#define FREE(field) free(set->samples.field);
+    EACH_SAMPLE_ARRAY(FREE)
+#undef FREE
     buffer_free(&set->buffer);
     buffer_free(&set->cells);
     buffer_free(&set->occupied);

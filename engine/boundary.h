@@ -24,8 +24,9 @@ typedef struct BoundarySet {
     bool has_reach;
     GridBounds reach; /* of the water, window-local: samples outside touch none and are not sorted */
     SampleSet sorted; /* in the window's frame, by cell */
-    uint32_t *origin; /* [count] which of `samples` a sorted one is */
+    uint32_t *origin; /* [sorted.count] which of `samples` a sorted one is */
     Float4 *world;    /* [count] window-local positions in the order of `samples`; [3]: volume */
+    uint32_t *cell;   /* [count] of these */
     Buffer buffer, cells, occupied;
 } BoundarySet;
 
@@ -61,8 +62,7 @@ bool boundary_append(BoundarySet *set, const BoundarySamples *more, Err *err);
 void boundary_set_free(BoundarySet *set);
 /* Sizes what a step needs. */
 bool boundary_reserve(Boundary *boundary, uint32_t particle_capacity, int body_count, Err *err);
-/* Sorts a set's world positions into cells of edge h. */
-bool boundary_sort(BoundarySet *set, float cell_size, Err *err);
+/* The bodies' centres of mass, window-local. */
 void boundary_place_centres(Boundary *boundary, const Body *bodies, int body_count, const double origin[3]);
 /* Moves the bodies' samples to where the bodies are and sorts them. */
 bool boundary_place(Boundary *boundary, const Body *bodies, int body_count, const double origin[3],

@@ -34,6 +34,8 @@ static const float MIN_DIAGONAL = 1e-6f;
  * diagonal: the first step would cut the pressures of both by a huge amount, of which each one's residual
  * knows only its own, and they went apart at thousands of m/s by the rest. */
 static const float THIN = 0.5f;
+/* Marks of a slice where nothing is held. */
+static const uint8_t NONE_HELD[SLICE];
 /* The divergence solve leaves out particles with fewer neighbours: spray has no divergence to speak of. */
 enum { MIN_NEIGHBOURS = 20 };
 /* The two-sided residual goes this far below the one-sided tolerance, so that the usual error, measured at
@@ -42,7 +44,7 @@ enum { MIN_NEIGHBOURS = 20 };
  * floor flicker with it; in water stiller than a settled tank a column would breathe within the tolerance,
  * and there it costs one iteration to say no. */
 static double safety(double motion) {
-    static const double knots[][2] = {{0.0008, 0.15}, {0.0014, 0.4}, {0.002, 0.4}, {0.02, 0.6}};
+    static const double knots[][2] = {{0.0008, 0.15}, {0.0014, 0.4}, {0.002, 0.4}, {0.02, 0.75}};
     enum { COUNT = sizeof knots / sizeof knots[0] };
     for (int k = 1; k < COUNT; k++)
         if (motion < knots[k][0]) {
@@ -121,14 +123,20 @@ static void total_partials(const Dfsph *dfsph, uint32_t blocks, int count, doubl
 
 /* ---- The operator ---- */
 
-/* What is held answers no pressure. */
+/* What is held answers no pressure: result = base for it. Few slices hold any, which one comparison tells. */
 static void hold_block(const uint8_t *held, const PairData *pairs, const AccelerateJob *job, uint32_t block) {
-    for (uint32_t i = block * BLOCK; i < (block + 1) * BLOCK; i++) {
-        if (!held[i])
+    EACH_SLICE {
+        if (memcmp(held + first, NONE_HELD, SLICE) == 0)
             continue;
-        for (int k = 0; k < 3; k++)
-            job->result[i][k] = job->base != NULL ? job->base[i][k] : 0.0f;
-        job->result[i][3] = vector_moment(pairs, pairs->position[i], job->result[i]);
+        for (uint32_t i = first; i < first + SLICE; i++) {
+            if (!held[i])
+                continue;
+            memset(job->result[i], 0, sizeof(Float4));
+            if (job->base == NULL)
+                continue; /* the usual case: no position is fetched */
+            memcpy(job->result[i], job->base[i], 3 * sizeof(float));
+            job->result[i][3] = vector_moment(pairs, pairs->position[i], job->result[i]);
+        }
     }
 }
 
@@ -389,7 +397,6 @@ static float warm_start(const SkiffParams *params, SolveKind kind) {
 static void start_slice(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, float *pressure,
                         uint32_t first) {
     static const float NO_PRESSURE[SLICE];
-    static const uint8_t NONE_HELD[SLICE];
     const float warm = warm_start(problem->params, kind);
     const int least_neighbours = kind == SOLVE_DIVERGENCE ? MIN_NEIGHBOURS : 0;
     const Float4 *gradient_sum = dfsph->pairs->gradient_sum + first;

@@ -22,11 +22,11 @@
 #include "params.h"
 #include "sim.h"
 
+#include "base/angle.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-
-static const double pi = 3.14159265358979323846;
 
 /* ---- Making ---- */
 

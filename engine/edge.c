@@ -150,8 +150,8 @@ static bool sort_rim(SkiffSim *sim, EdgePlace *place, Err *err) {
         return err_set(err, ERR_INPUT, "the window spans more than %d cells of %g m", GRID_MAX_CELLS,
                        (double)place->support);
     const CellGrid *grid = &place->rim_cells;
-    const size_t cells = (size_t)grid->size[0] * (size_t)grid->size[1] * (size_t)grid->size[2];
-    if (!buffer_reserve(&sea->rim_start, "cells of the edge", (cells + 2) * sizeof(uint32_t), err) ||
+    const size_t cells = cell_grid_count(grid);
+    if (!buffer_reserve(&sea->rim_start, "cells of the edge", (cells + 1) * sizeof(uint32_t), err) ||
         !buffer_reserve(&sea->rim_index, "particles of the edge",
                         2 * (size_t)particles->capacity * sizeof(uint32_t), err))
         return false;
@@ -161,17 +161,9 @@ static bool sort_rim(SkiffSim *sim, EdgePlace *place, Err *err) {
         const float *p = particles->position[i];
         const bool near = particles->edge[i] != EDGE_NONE &&
                           distance_before(place, p) >= place->support - RIM * place->radius;
-        cell[i] = near ? (uint32_t)grid_cell_of(grid, p) : UINT32_MAX;
+        cell[i] = near ? grid_cell_of(grid, p) : CELL_NONE;
     }
-    memset(start, 0, (cells + 2) * sizeof(uint32_t));
-    for (uint32_t i = 0; i < particles->count; i++)
-        if (cell[i] != UINT32_MAX)
-            start[cell[i] + 2]++;
-    for (size_t c = 0; c < cells; c++)
-        start[c + 2] += start[c + 1];
-    for (uint32_t i = 0; i < particles->count; i++)
-        if (cell[i] != UINT32_MAX)
-            index[start[cell[i] + 1]++] = i;
+    cell_grid_sort(cell, particles->count, cells, start, index);
     place->rim_cells.start = start;
     place->rim_index = index;
     return true;
@@ -181,12 +173,10 @@ static bool sort_rim(SkiffSim *sim, EdgePlace *place, Err *err) {
 static bool is_taken(const EdgePlace *place, const float p[3]) {
     const Particles *particles = &place->sim->particles;
     const CellGrid *grid = &place->rim_cells;
-    int32_t c[3];
-    for (int k = 0; k < 3; k++)
-        c[k] = (int32_t)((p[k] - grid->origin[k]) * grid->inv_size);
-    for (int run = 0; run < 9; run++) {
-        const int32_t cell = cell_grid_index(grid, c[0] + run / 3 - 1, c[1], c[2] + run % 3 - 1);
-        for (uint32_t n = grid->start[cell - 1]; n < grid->start[cell + 2]; n++) {
+    const int32_t cell = (int32_t)grid_cell_of(grid, p);
+    for (int run = 0; run < CELL_RUNS; run++) {
+        const CellRun around = cell_grid_run(grid, cell, run);
+        for (uint32_t n = around.begin; n < around.end; n++) {
             const uint32_t j = place->rim_index[n];
             const float least = place->radius * (particles->edge[j] == EDGE_LAID ? SAME : APART);
             float distance_sq = 0.0f;

@@ -5,6 +5,8 @@
 #ifndef SKIFF_KERNEL_H
 #define SKIFF_KERNEL_H
 
+#include "base/angle.h"
+
 #include <math.h>
 
 typedef struct Kernel {
@@ -15,7 +17,6 @@ typedef struct Kernel {
 } Kernel;
 
 static inline Kernel kernel_make(double support) {
-    const double pi = 3.14159265358979323846;
     return (Kernel){.support = (float)support,
                     .inv_support = (float)(1.0 / support),
                     .w_scale = (float)(8.0 / (pi * support * support * support)),

@@ -40,10 +40,6 @@ void particles_free(Particles *particles) {
     *particles = (Particles){0};
 }
 
-void *particles_data(Particles *particles, ParticleFieldId field) {
-    return particles->front[field].data;
-}
-
 static void permute_field(const ParticleFieldInfo *info, const void *from, void *to, const uint32_t *order,
                           uint32_t begin, uint32_t end) {
     switch (info->size) {

@@ -45,9 +45,6 @@ extern const ParticleFieldInfo particle_fields[PARTICLE_FIELD_COUNT];
 bool particles_reserve(Particles *particles, uint32_t capacity, Err *err);
 void particles_free(Particles *particles);
 
-/* Field data, count elements. */
-void *particles_data(Particles *particles, ParticleFieldId field);
-
 /* New particle k of the sorted order is old particle order[k]; the first `count` stay. Zeroes the padding
  * after them. */
 void particles_permute(Particles *particles, const uint32_t *order, uint32_t count, int threads);

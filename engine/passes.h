@@ -8,6 +8,7 @@
 #define SKIFF_PASSES_H
 
 #include "base/simd.h"
+#include "cell_grid.h"
 #include "kernel.h"
 
 #include <stdbool.h>
@@ -39,23 +40,6 @@ typedef struct RowEntryWide {
     int32_t place[SLICE];
     uint16_t factor[SLICE];
 } RowEntryWide;
-
-/* Cells of edge h over the particles' bounds with one empty layer around; y fastest, then z, then x: the
- * three cells of a column that a particle sees are one contiguous run of particles. */
-typedef struct CellGrid {
-    float origin[3];       /* m */
-    float inv_size;        /* 1/m */
-    int32_t size[3];       /* cells along x, y, z */
-    const uint32_t *start; /* [cells + 1] first particle of a cell */
-} CellGrid;
-
-static inline int32_t cell_grid_index(const CellGrid *grid, int32_t x, int32_t y, int32_t z) {
-    return (x * grid->size[2] + z) * grid->size[1] + y;
-}
-
-static inline size_t cell_grid_count(const CellGrid *grid) {
-    return (size_t)grid->size[0] * (size_t)grid->size[1] * (size_t)grid->size[2];
-}
 
 /* Terms of one particle against one wall or body, summed over its samples b of volume psi_b: g = sum psi_b
  * grad W_ib, t = sum psi_b (x_b - c) x grad W_ib with c the object's centre (origin for walls). They replace
@@ -177,10 +161,9 @@ static inline uint32_t entry_neighbour(const PairData *pairs, uint32_t first, ui
 
 typedef enum SearchStatus {
     SEARCH_OK = 0,
-    SEARCH_NEEDS_WIDE = 1,   /* an index offset does not fit RowEntry */
-    SEARCH_TOO_DENSE = 2,    /* more than MAX_NEIGHBOURS or MAX_CANDIDATES */
-    SEARCH_NEEDS_MEMORY = 4, /* the row pool is too small */
-    SEARCH_TOO_MANY_OBJECTS = 8
+    SEARCH_NEEDS_WIDE = 1,  /* an index offset does not fit RowEntry */
+    SEARCH_TOO_DENSE = 2,   /* more than MAX_NEIGHBOURS or MAX_CANDIDATES */
+    SEARCH_NEEDS_MEMORY = 4 /* the row pool is too small */
 } SearchStatus;
 
 /* Takes room for `entries` row entries; returns the first or UINT32_MAX when the pool is used up. Called by

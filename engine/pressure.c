@@ -24,13 +24,14 @@
  * run. */
 typedef struct PressureCloud {
     CellGrid cells;
-    uint32_t *start; /* [cells + 1] */
-    uint32_t *order; /* [count] particle k of the cloud is the simulation's order[k] */
-    Float4 *points;  /* [count] position, unknown (Pa) */
+    uint32_t *start, *cell; /* [cells + 1]; [count] */
+    uint32_t *order;        /* [count] particle k of the cloud is the simulation's order[k] */
+    Float4 *points;         /* [count] position, unknown (Pa) */
 } PressureCloud;
 
 static void cloud_free(PressureCloud *cloud) {
     free(cloud->start);
+    free(cloud->cell);
     free(cloud->order);
     free(cloud->points);
 }
@@ -52,49 +53,44 @@ static bool cloud_layout(const SkiffSim *sim, PressureCloud *cloud, Err *err) {
                    (double)sim->kernel.support);
 }
 
-static void cloud_sort(const SkiffSim *sim, const float *unknown, PressureCloud *cloud, size_t cells) {
+static void cloud_sort(const SkiffSim *sim, const float *unknown, PressureCloud *cloud) {
     const Particles *particles = &sim->particles;
-    uint32_t *start = cloud->start;
     for (uint32_t i = 0; i < particles->count; i++)
-        start[grid_cell_of(&cloud->cells, particles->position[i]) + 1]++;
-    for (size_t c = 0; c < cells; c++)
-        start[c + 1] += start[c];
-    for (uint32_t i = 0; i < particles->count; i++) {
+        cloud->cell[i] = grid_cell_of(&cloud->cells, particles->position[i]);
+    cell_grid_sort(cloud->cell, particles->count, cell_grid_count(&cloud->cells), cloud->start, cloud->order);
+    for (uint32_t k = 0; k < particles->count; k++) {
+        const uint32_t i = cloud->order[k];
         const float *x = particles->position[i];
-        const uint32_t to = start[grid_cell_of(&cloud->cells, x)]++;
-        cloud->order[to] = i;
-        memcpy(cloud->points[to], (float[]){x[0], x[1], x[2], unknown[i]}, sizeof(Float4));
+        memcpy(cloud->points[k], (float[]){x[0], x[1], x[2], unknown[i]}, sizeof(Float4));
     }
-    memmove(start + 1, start, cells * sizeof *start);
-    start[0] = 0;
+    cloud->cells.start = cloud->start;
 }
 
 static bool cloud_make(const SkiffSim *sim, const float *unknown, PressureCloud *cloud, Err *err) {
     *cloud = (PressureCloud){0};
     if (!cloud_layout(sim, cloud, err))
         return false;
-    const int32_t *size = cloud->cells.size;
-    const size_t cells = (size_t)size[0] * (size_t)size[1] * (size_t)size[2], count = sim->particles.count;
-    cloud->start = calloc(cells + 1, sizeof *cloud->start);
+    const size_t count = sim->particles.count;
+    cloud->start = malloc((cell_grid_count(&cloud->cells) + 1) * sizeof *cloud->start);
+    cloud->cell = malloc(count * sizeof *cloud->cell);
     cloud->order = malloc(count * sizeof *cloud->order);
     cloud->points = malloc(count * sizeof *cloud->points);
-    if (cloud->start == NULL || cloud->order == NULL || cloud->points == NULL) {
+    if (!cloud->start || !cloud->cell || !cloud->order || !cloud->points) {
         cloud_free(cloud);
         return err_set(err, ERR_INPUT, "no memory for the pressures of %u particles", sim->particles.count);
     }
-    cloud_sort(sim, unknown, cloud, cells);
+    cloud_sort(sim, unknown, cloud);
     return true;
 }
 
 /* sum_j P_j W_ij, Pa/m^3. */
 static double cloud_sum(const PressureCloud *cloud, const Kernel *kernel, const float *p) {
-    const int32_t column = cloud->cells.size[1], slab = column * cloud->cells.size[2];
     const int32_t cell = (int32_t)grid_cell_of(&cloud->cells, p);
     const float support_sq = kernel->support * kernel->support;
     double sum = 0.0;
-    for (int run = 0; run < 9; run++) {
-        const int32_t middle = cell + (run / 3 - 1) * slab + (run % 3 - 1) * column;
-        for (uint32_t j = cloud->start[middle - 1]; j < cloud->start[middle + 2]; j++) {
+    for (int run = 0; run < CELL_RUNS; run++) {
+        const CellRun near = cell_grid_run(&cloud->cells, cell, run);
+        for (uint32_t j = near.begin; j < near.end; j++) {
             const float *q = cloud->points[j];
             const float dx = p[0] - q[0], dy = p[1] - q[1], dz = p[2] - q[2];
             const float distance_sq = dx * dx + dy * dy + dz * dz;

@@ -245,20 +245,12 @@ static double read_height(const SkiffSim *sim, const Probe *probe) {
 /* Force of one particle on the chosen samples of a set, per unit of pressure. */
 static void part_force(const SkiffSim *sim, const BoundarySet *set, const uint8_t *chosen, const float p[3],
                        double weight, const float centre[3], double force[6]) {
-    const CellGrid *grid = &set->sorted.grid;
-    int32_t c[3];
-    for (int k = 0; k < 3; k++) {
-        c[k] = (int32_t)floorf((p[k] - grid->origin[k]) * grid->inv_size);
-        if (c[k] < 0 || c[k] >= grid->size[k])
-            return;
-    }
-    const int32_t cell = cell_grid_index(grid, c[0], c[1], c[2]);
-    if (!set->sorted.occupied[cell])
+    const int32_t cell = cell_grid_inner(&set->sorted.grid, p);
+    if (cell < 0 || !set->sorted.occupied[cell])
         return;
-    const int32_t column = grid->size[1], slab = grid->size[1] * grid->size[2];
-    for (int run = 0; run < 9; run++) {
-        const int32_t middle = cell + (run / 3 - 1) * slab + (run % 3 - 1) * column;
-        for (uint32_t s = grid->start[middle - 1]; s < grid->start[middle + 2]; s++) {
+    for (int run = 0; run < CELL_RUNS; run++) {
+        const CellRun near = cell_grid_run(&set->sorted.grid, cell, run);
+        for (uint32_t s = near.begin; s < near.end; s++) {
             if (!chosen[set->origin[s]])
                 continue;
             const double at[3] = {set->sorted.x[s], set->sorted.y[s], set->sorted.z[s]};

@@ -1,11 +1,11 @@
-/* Memory and scheduling of the neighbour search; the search itself is in passes.c. */
+/* Memory and scheduling of the neighbour search; the search itself is in search.c. */
 #include "rows.h"
 
 #include <omp.h>
 
 enum { CHUNK_ENTRIES = 4096 };
 
-size_t rows_entry_size(bool wide) {
+static size_t entry_size(bool wide) {
     return wide ? sizeof(RowEntryWide) : sizeof(RowEntry);
 }
 
@@ -46,8 +46,7 @@ static bool rows_reserve(Rows *rows, const Particles *particles, int threads, Er
     const size_t padded = particles->capacity + SLICE, slices = particles->capacity / SLICE + 1;
     if (rows->pool_entries == 0) /* 45 places a particle: 39 are needed in water at rest */
         rows->pool_entries = (uint32_t)(slices * 45) + CHUNK_ENTRIES * (uint32_t)threads;
-    return buffer_reserve(&rows->pool, "neighbour rows", rows->pool_entries * rows_entry_size(rows->wide),
-                          err) &&
+    return buffer_reserve(&rows->pool, "neighbour rows", rows->pool_entries * entry_size(rows->wide), err) &&
            buffer_reserve(&rows->weights, "neighbour weights",
                           (size_t)rows->pool_entries * SLICE * sizeof(int16_t), err) &&
            buffer_reserve(&rows->slices, "row starts", slices * sizeof(SliceRows), err) &&

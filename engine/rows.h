@@ -3,10 +3,9 @@
 #define SKIFF_ROWS_H
 
 #include "grid.h"
+#include "skiff.h"
 
 #include <stdatomic.h>
-
-enum { ROWS_MAX_THREADS = 256 };
 
 typedef struct RowShare {
     uint32_t next, end; /* entries of the pool this thread may still take */
@@ -24,25 +23,25 @@ typedef struct Rows {
     Buffer pool, weights, slices, density, gradient_sum, neighbour_counts;
     uint32_t pool_entries;
     atomic_uint pool_used;
-    RowShare shares[ROWS_MAX_THREADS];
+    RowShare shares[SKIFF_MAX_THREADS];
     Buffer gradients, corrected_sum, shape[2], push, apart;
     Buffer scratch; /* Scratch of every thread */
 } Rows;
 
-/* Neighbours, densities (fluid part) and gradient sums (fluid part, fixed-point units) of the sorted
- * particles. Grows the pool when it is too small, and turns to wide entries when offsets do not fit: both
- * happen in the first steps or never. `frozen` (NULL: none) marks particles that others see but that get no
- * row; `standing` (NULL: none) is more water that does not move. */
+/* What rows are built from. */
 typedef struct RowsJob {
     const Passes *passes;
     const Grid *grid;
     const Particles *particles;
     const Kernel *kernel;
-    float volume;          /* m^3, of a particle */
-    const uint8_t *frozen; /* [particles] or NULL */
-    const StandingSet *standing;
+    float volume;                /* m^3, of a particle */
+    const uint8_t *frozen;       /* NULL, or [particles] 1: others see it, but it gets no row */
+    const StandingSet *standing; /* NULL, or more water that does not move */
     int threads;
 } RowsJob;
+/* Neighbours, densities (fluid part) and gradient sums (fluid part, fixed-point units) of the sorted
+ * particles. Grows the pool when it is too small, and turns to wide entries when offsets do not fit: both
+ * happen in the first steps or never. ERR_DIVERGED: a particle has too many neighbours, and is named. */
 bool rows_build(Rows *rows, const RowsJob *job, Err *err);
 /* Room for `shape`, the moments that boundary_apply adds for rows_correct. */
 bool rows_reserve_correction(Rows *rows, const Particles *particles, Err *err);
@@ -50,6 +49,5 @@ bool rows_reserve_correction(Rows *rows, const Particles *particles, Err *err);
 void rows_correct(Rows *rows, const Passes *passes, int threads);
 void rows_free(Rows *rows);
 Scratch *rows_scratch(Rows *rows, int thread);
-size_t rows_entry_size(bool wide);
 
 #endif

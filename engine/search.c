@@ -481,7 +481,6 @@ static bool contact_add(const BoundaryJob *job, const NearSamples *near, int s, 
 static bool gather_samples(const BoundaryJob *job, const SampleSet *set, const int32_t c[3],
                            NearSamples *near) {
     const CellGrid *grid = &set->grid;
-    const int32_t column = grid->size[1], slab = grid->size[1] * grid->size[2];
     const float edge = 1.0f / grid->inv_size;
     Reach reach = {.limit = reach_limit(&job->kernel)};
     for (int k = 0; k < 3; k++) {
@@ -490,12 +489,11 @@ static bool gather_samples(const BoundaryJob *job, const SampleSet *set, const i
     }
     near->cell = cell_grid_index(grid, c[0], c[1], c[2]);
     near->count = 0;
-    for (int run = 0; run < 9; run++) {
-        const int32_t middle = near->cell + (run / 3 - 1) * slab + (run % 3 - 1) * column;
-        const uint32_t end = grid->start[middle + 2];
-        for (uint32_t s = grid->start[middle - 1]; s < end; s += LANES) {
+    for (int run = 0; run < CELL_RUNS; run++) {
+        const CellRun part = cell_grid_run(grid, near->cell, run);
+        for (uint32_t s = part.begin; s < part.end; s += LANES) {
             const Vf x = vf_load(set->x + s), y = vf_load(set->y + s), z = vf_load(set->z + s);
-            const Vm mine = (Vm)(within_reach(&reach, x, y, z) & first_lanes(end - s));
+            const Vm mine = (Vm)(within_reach(&reach, x, y, z) & first_lanes(part.end - s));
             const int to = near->count;
             if (to + __builtin_popcount(mine) > MAX_NEAR_SAMPLES)
                 return false;

@@ -11,6 +11,8 @@
  * Not here: unions and differences of shapes, and bodies that turn (their meshes are in body.c). */
 #include "shape.h"
 
+#include "base/angle.h"
+
 #include <assert.h>
 #include <math.h>
 #include <string.h>
@@ -21,8 +23,6 @@ enum {
     BATCH = 1024,     /* points of one thread at a time */
     STAR_BATCH = 64
 };
-
-static const double pi = 3.14159265358979323846;
 
 /* ---- Profiles in the plane ---- */
 

@@ -34,7 +34,7 @@ int sim_threads(int wanted) {
         fclose(file);
     }
     cores = cores > 0 && cores < cpus ? cores : cpus;
-    return cores < ROWS_MAX_THREADS ? cores : ROWS_MAX_THREADS;
+    return cores < SKIFF_MAX_THREADS ? cores : SKIFF_MAX_THREADS;
 }
 
 static bool simd_available(SkiffSimd simd) {
@@ -63,9 +63,9 @@ static bool choose_passes(SkiffSim *sim, const SkiffDef *def, Err *err) {
     if (sim->simd == SKIFF_SIMD_AVX512)
         sim->passes = &passes_avx512;
 #endif
-    if (def->threads < 0 || def->threads > ROWS_MAX_THREADS)
+    if (def->threads < 0 || def->threads > SKIFF_MAX_THREADS)
         return err_add(err, ERR_USAGE, "threads: %d is out of range, allowed is 0 to %d", def->threads,
-                       ROWS_MAX_THREADS);
+                       SKIFF_MAX_THREADS);
     sim->threads = sim_threads(def->threads);
     return true;
 }

@@ -47,9 +47,10 @@ typedef struct SkiffDriveDef {
 #undef PARAM_VEC3
 #undef PARAM_ENUM
 
-/* Values of the enums of drive.inl, in the order of their names. */
-/* The same of params.inl. */
+/* Values of enums of params.inl, in the order of their names. */
 enum { SKIFF_SOLVER_GCR, SKIFF_SOLVER_JACOBI, SKIFF_SOLVER_SPLIT };
+enum { SKIFF_ESCAPE_ERROR, SKIFF_ESCAPE_REMOVE };
+/* The same of drive.inl. */
 enum { SKIFF_THRUST_AT_CENTRE, SKIFF_THRUST_AT_PROPELLER };
 enum { SKIFF_STEERING_TORQUE, SKIFF_STEERING_RUDDER };
 enum { SKIFF_HOLD_PROPORTIONAL, SKIFF_HOLD_BANGBANG };
@@ -69,7 +70,7 @@ typedef struct SkiffParamInfo {
 
 const SkiffParamInfo *skiff_param_infos(int *count); /* of SkiffParams */
 const SkiffParamInfo *skiff_drive_infos(int *count); /* of SkiffDriveDef */
-/* Every field in its range and finite; one line of message for each that is not. */
+/* Every field in its range and finite; ERR_INPUT with one line of message for each that is not. */
 bool skiff_params_check(const SkiffParams *params, Err *err);
 
 /* ---- What a simulation is made of. Strings and arrays are borrowed during skiff_create only. ---- */
@@ -184,8 +185,9 @@ typedef struct SkiffSeaDef {
     bool on;
     float level;        /* y of the still surface, m */
     const char *follow; /* a body's name, or NULL */
-    const double (
-        *path)[3]; /* t (s), x, z (m): where the middle of the window goes instead; NULL: it stays */
+    /* [path_count] time (s, rising), x, z (m): where the middle of the window goes instead, along straight
+     * lines; NULL: it stays */
+    const double (*path)[3];
     int path_count;
     bool absorb;
     bool has_region; /* absorption only where [min, max] is, m */
@@ -195,6 +197,9 @@ typedef struct SkiffSeaDef {
 } SkiffSeaDef;
 
 typedef enum SkiffSimd { SKIFF_SIMD_AUTO, SKIFF_SIMD_PLAIN, SKIFF_SIMD_AVX2, SKIFF_SIMD_AVX512 } SkiffSimd;
+#define SKIFF_SIMD_NAMES "auto|plain|avx2|avx512" /* as skiff_simd_name has them */
+
+enum { SKIFF_MAX_THREADS = 256 };
 
 typedef struct SkiffDef {
     SkiffParams params;
@@ -209,10 +214,11 @@ typedef struct SkiffDef {
     double start_time; /* s */
     bool has_domain;   /* false: bounds of everything, grown */
     float domain_min[3], domain_max[3];
-    int threads; /* 0: the number of physical cores this process may use */
+    int threads; /* up to SKIFF_MAX_THREADS; 0: the number of physical cores this process may use */
     SkiffSimd simd;
 } SkiffDef;
 
+/* Where every def begins: the defaults of a scene file. What has none (names, kinds of geometry) is zero. */
 SkiffDef skiff_def_default(void);
 SkiffGeometryDef skiff_geometry_default(void);
 SkiffBlockDef skiff_block_default(void);
@@ -225,9 +231,9 @@ SkiffProbeDef skiff_probe_default(void);
 typedef struct SkiffSim SkiffSim;
 
 /* Checks everything, then builds. NULL with ERR_INPUT: every problem found, one a line, each beginning with
- * the scene's path of it
- * ("FluidBlocks[2]: ..."). */
+ * its path in a scene file ("FluidBlocks[2]: ..."). */
 SkiffSim *skiff_create(const SkiffDef *def, Err *err);
+/* NULL is fine. */
 void skiff_destroy(SkiffSim *sim);
 
 /* One step of params.time_step. ERR_DIVERGED (step, particle, value in the message): the state is the one in
@@ -239,16 +245,16 @@ bool skiff_step(SkiffSim *sim, Err *err);
  * memory, or params.volume_factor is not the rest tile's; ERR_DIVERGED, what exists is not fit to be filled
  * beside. */
 bool skiff_fill_block(SkiffSim *sim, const SkiffBlockDef *block, Err *err);
-/* Takes away the fluid particles inside [min, max) (m, world); the others stay as they are. ERR_INPUT: no
- * memory, and nothing is removed. */
+/* Takes away the fluid particles inside [min, max) (m, world) and tells how many these were; the others stay
+ * as they are. ERR_INPUT: no memory, and nothing is removed. */
 bool skiff_remove_box(SkiffSim *sim, const double min[3], const double max[3], uint32_t *removed, Err *err);
 
 /* ---- Looking ---- */
 
 double skiff_time(const SkiffSim *sim); /* s */
 uint64_t skiff_step_count(const SkiffSim *sim);
-const SkiffParams *skiff_params(const SkiffSim *sim);
-SkiffSimd skiff_simd(const SkiffSim *sim); /* the one in use, never AUTO */
+const SkiffParams *skiff_params(const SkiffSim *sim); /* the simulation's own */
+SkiffSimd skiff_simd(const SkiffSim *sim);            /* the one in use, never AUTO */
 const char *skiff_simd_name(SkiffSimd simd);
 int skiff_threads(const SkiffSim *sim);
 
@@ -267,11 +273,11 @@ typedef struct SkiffParticles {
 } SkiffParticles;
 SkiffParticles skiff_particles(const SkiffSim *sim);
 
-/* Pressure of every particle, Pa, mean over the last step; before it, of water at rest. It takes a search for
- * neighbours, which no step pays for. The gradient of p(x) = sum_j V P_j W(x - x_j), P the unknowns above, is
- * what accelerates the water, and its value at a wall is the force on the wall's area (pressure.c has the
- * derivation): it is hydrostatic in water at rest up to floors, walls and corners. ERR_INPUT: no memory;
- * ERR_DIVERGED: a particle is nowhere. */
+/* Pressure of every particle (skiff_particles(sim).count values, in their order), Pa, mean over the last
+ * step; before it, of water at rest. It takes a search for neighbours, which no step pays for. The gradient
+ * of p(x) = sum_j V P_j W(x - x_j), P the unknowns above, is what accelerates the water, and its value at a
+ * wall is the force on the wall's area (pressure.c has the derivation): it is hydrostatic in water at rest up
+ * to floors, walls and corners. ERR_INPUT: no memory; ERR_DIVERGED: a particle is nowhere. */
 bool skiff_pressure(const SkiffSim *sim, float *pressure, Err *err);
 
 /* Samples of walls and of bodies. Volumes after [Akinci2012]. */
@@ -296,9 +302,11 @@ typedef struct SkiffBody {
     double torque[3];           /* about the centre of mass, N m */
     uint32_t sample_count;
 } SkiffBody;
+/* Bodies are numbered as in the def, from 0. */
 int skiff_body_count(const SkiffSim *sim);
 SkiffBody skiff_body(const SkiffSim *sim, int index);
-/* Adds a force (N) and a torque about the centre of mass (N m), world axes, during the next step. */
+/* Adds a force (N) and a torque about the centre of mass (N m), world axes, during the next step; nothing
+ * moves along axes that are not free. Calls add up; saved states do not hold what no step has used. */
 void skiff_body_push(SkiffSim *sim, int index, const double force[3], const double torque[3]);
 /* The body's surface in body axes, relative to the centre of mass: a point p is at position + R p in the
  * world. Owned by the simulation. */
@@ -313,6 +321,7 @@ const char *skiff_body_material_name(const SkiffSim *sim, int index, int materia
 /* The surface of the tank, window-local; no triangles where there is none. Owned by the simulation. */
 void skiff_tank_mesh(const SkiffSim *sim, const float (**vertices)[3], uint32_t *vertex_count,
                      const uint32_t (**triangles)[3], uint32_t *triangle_count);
+
 /* ---- Driving. Drives are numbered in the order of their bodies. ---- */
 
 /* What the helmsman does. All zero: nothing. */
@@ -348,6 +357,7 @@ enum {
 #undef PHASE
     SKIFF_PHASE_COUNT
 };
+/* Key: a word for files. Label: for people. Static strings. */
 const char *skiff_phase_key(int phase);
 const char *skiff_phase_label(int phase);
 
@@ -394,27 +404,29 @@ typedef struct SkiffStats {
     double phase_ms[SKIFF_PHASE_COUNT];
     double step_ms;
 } SkiffStats;
+/* Of the last step. */
 const SkiffStats *skiff_stats(const SkiffSim *sim);
 
-/* Where the window is. False: there is none. */
+/* Where the window is. */
 typedef struct SkiffWindow {
     double centre[3]; /* world, m; y of the still surface */
     double level;     /* y of the still surface, world, m */
     uint64_t moves;
 } SkiffWindow;
+/* False: there is none. */
 bool skiff_window(const SkiffSim *sim, SkiffWindow *window);
-/* Distance to the window's edge, m, negative inside, of window-local points. */
+/* Distances to the window's edge, m, negative inside, of `count` window-local points ([3] is not looked at).
+ * There must be a window. */
 void skiff_window_distances(const SkiffSim *sim, const float (*position)[4], uint32_t count, float *distance);
 
 /* Particles that a window move or absorption took away during the last half second; window-local, where and
  * how fast they were then. */
 typedef struct SkiffGhosts {
     uint32_t count;
-    const float (*position)[4];
-    const float (*velocity)[4];
+    const float (*position)[4]; /* m */
+    const float (*velocity)[4]; /* m/s */
     const uint64_t *id;
-    const double *birth;
-    const double *removed; /* s */
+    const double *birth, *removed; /* s */
 } SkiffGhosts;
 SkiffGhosts skiff_ghosts(const SkiffSim *sim);
 
@@ -442,6 +454,7 @@ const SkiffFill *skiff_fill(const SkiffSim *sim);
  * tz). */
 int skiff_probe_channel_count(const SkiffSim *sim);
 const char *skiff_probe_channel_name(const SkiffSim *sim, int channel); /* "name" or "name.fx" */
+/* `values`: one for each channel. */
 void skiff_probe_read(const SkiffSim *sim, double *values);
 
 /* XXH3 of the whole state: time, particles, warm starts, bodies. Equal for equal states whatever threads, ISA
@@ -466,12 +479,11 @@ bool skiff_load(SkiffSim *sim, const char *path, Err *err);
 typedef struct SkiffTile SkiffTile;
 
 typedef struct SkiffTileDef {
-    double
-        edge; /* of the cube to begin with, d: 6 to 64; scaling to rest density changes it by about 0.1 % */
+    double edge; /* of the cube to begin with, d: 6 to 64; scaling to rest density changes it by 0.1 % */
     double volume_factor; /* volume of a particle, d^3 */
     uint64_t seed;
     int iterations; /* at most; the relaxation ends sooner when nothing moves any more */
-    int threads;    /* 0: as SkiffDef.threads; the result does not depend on it */
+    int threads;    /* as SkiffDef.threads; the result does not depend on it */
 } SkiffTileDef;
 
 typedef struct SkiffTileInfo {
@@ -487,7 +499,7 @@ typedef struct SkiffTileQuality {
     double density_mean, density_sd, density_min, density_max; /* rho / rho0 */
     double gradient_rms, gradient_max;                         /* h |sum V grad W|: 0 for perfect symmetry */
     double force_rms, force_max;      /* h |sum V (s_i + s_j) / 2 grad W|, s the pressure shares: what of the
-                                         former      these leave unbalanced */
+                                         former these leave unbalanced */
     double share_sd;                  /* of s, whose mean is 1 */
     double anisotropy;                /* largest entry of 3 sum W d d^T / sum W d^2 - I */
     double nearest_min, nearest_mean; /* distance to the nearest point, d */
@@ -506,9 +518,12 @@ SkiffTile *skiff_tile_cut(const SkiffSim *sim, const double min[3], const double
 SkiffTile *skiff_tile_surface(int threads, Err *err);
 /* Reads a file; path NULL: the tile that comes with the program. NULL with ERR_INPUT or ERR_IO. */
 SkiffTile *skiff_tile_open(const char *path, Err *err);
+/* ERR_IO: the old file, if any, is intact. */
 bool skiff_tile_save(const SkiffTile *tile, const char *path, Err *err);
 SkiffTileInfo skiff_tile_info(const SkiffTile *tile);
+/* ERR_INPUT: a block so small that no point of it has all its neighbours, or no memory. */
 bool skiff_tile_measure(const SkiffTile *tile, SkiffTileQuality *quality, Err *err);
+/* NULL is fine. */
 void skiff_tile_destroy(SkiffTile *tile);
 
 #ifdef __cplusplus

@@ -32,8 +32,9 @@ static bool reserve_sorted(StandingWater *water, Err *err) {
     const size_t cells = cell_grid_count(&water->set.grid), padded = water->count + (size_t)SLICE;
     if (!buffer_reserve(&water->sorted, "standing water by cell",
                         padded * (sizeof(Float4) + 3 * sizeof(float)), err) ||
-        !buffer_reserve(&water->cells, "cells of standing water", water->count * sizeof(uint32_t), err) ||
-        !buffer_reserve(&water->start, "cell starts of standing water", (cells + 2) * sizeof(uint32_t), err))
+        !buffer_reserve(&water->cells, "cells of standing water", (size_t)2 * water->count * sizeof(uint32_t),
+                        err) ||
+        !buffer_reserve(&water->start, "cell starts of standing water", (cells + 1) * sizeof(uint32_t), err))
         return false;
     Float4 *points = water->sorted.data;
     float *x = (float *)(points + padded);
@@ -66,24 +67,18 @@ bool standing_sort(StandingWater *water, float cell_size, Err *err) {
         return true;
     if (!lay_out(water, cell_size, err) || !reserve_sorted(water, err))
         return false;
-    /* start[c + 1] runs from a cell's first point to the next cell's while they are dealt out */
-    uint32_t *start = water->start.data, *cell = water->cells.data;
-    const size_t cells = cell_grid_count(&set->grid);
-    memset(start, 0, (cells + 2) * sizeof(uint32_t));
-    for (uint32_t i = 0; i < water->count; i++) {
+    uint32_t *cell = water->cells.data, *order = cell + water->count;
+    for (uint32_t i = 0; i < water->count; i++)
         cell[i] = grid_cell_of(&set->grid, water->points[i]);
-        start[cell[i] + 2]++;
-    }
-    for (size_t c = 0; c < cells; c++)
-        start[c + 2] += start[c + 1];
+    cell_grid_sort(cell, water->count, cell_grid_count(&set->grid), water->start.data, order);
     float *x = (float *)set->x, *y = (float *)set->y, *z = (float *)set->z;
     Float4 *points = (Float4 *)set->points;
-    for (uint32_t i = 0; i < water->count; i++) {
-        const uint32_t to = start[cell[i] + 1]++;
-        x[to] = water->points[i][0];
-        y[to] = water->points[i][1];
-        z[to] = water->points[i][2];
-        memcpy(points[to], water->points[i], sizeof points[to]);
+    for (uint32_t k = 0; k < water->count; k++) {
+        const float *point = water->points[order[k]];
+        x[k] = point[0];
+        y[k] = point[1];
+        z[k] = point[2];
+        memcpy(points[k], point, sizeof points[k]);
     }
     return true;
 }

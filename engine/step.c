@@ -48,7 +48,7 @@ static bool place_bodies(SkiffSim *sim, Err *err) {
 }
 
 static bool sort_particles(SkiffSim *sim, Err *err) {
-    const bool remove = sim->params.escape == 1;
+    const bool remove = sim->params.escape == SKIFF_ESCAPE_REMOVE;
     sim->edge_count = 0;
     for (uint32_t i = 0; sim->sea.water_edge && i < sim->particles.count; i++)
         sim->edge_count += sim->particles.edge[i] != EDGE_NONE;

@@ -6,6 +6,7 @@
  * those. */
 #include "tile_pairs.h"
 
+#include "cell_grid.h"
 #include "dvec.h"
 
 #include <stdlib.h>
@@ -13,6 +14,8 @@
 
 static const double skin = 0.4; /* what a search reaches beyond the support radius, r */
 
+/* Of a box, which they divide into equal parts: a periodic one has no place for layers around or for a width
+ * of the cells' own, as a CellGrid has. */
 typedef struct Cells {
     int64_t counts[3];
     uint32_t *start, *member; /* members of cell c: member[start[c]] .. member[start[c + 1]] */
@@ -63,7 +66,7 @@ static uint32_t cell_index(const Cells *cells, const int64_t at[3]) {
     return (uint32_t)((at[0] * cells->counts[1] + at[1]) * cells->counts[2] + at[2]);
 }
 
-/* Stable counting sort of the points into cells at least as wide as the search reaches. */
+/* Sorts the points into cells at least as wide as the search reaches. */
 static bool sort_cells(TilePairs *pairs, Cells *cells, Err *err) {
     for (int k = 0; k < 3; k++) {
         double *size = &pairs->size[k];
@@ -75,7 +78,7 @@ static bool sort_cells(TilePairs *pairs, Cells *cells, Err *err) {
         cells->counts[k] = (int64_t)fmin(fmax(floor(*size / reach), 1.0), 500.0);
     }
     const size_t total = (size_t)(cells->counts[0] * cells->counts[1] * cells->counts[2]);
-    cells->start = calloc(total + 2, sizeof *cells->start);
+    cells->start = malloc((total + 1) * sizeof *cells->start);
     cells->member = malloc(((size_t)pairs->count + 1) * sizeof *cells->member);
     cells->cell_of = malloc(((size_t)pairs->count + 1) * sizeof *cells->cell_of);
     if (!cells->start || !cells->member || !cells->cell_of)
@@ -84,12 +87,8 @@ static bool sort_cells(TilePairs *pairs, Cells *cells, Err *err) {
         int64_t at[3];
         cell_coordinates(pairs, cells, i, at);
         cells->cell_of[i] = cell_index(cells, at);
-        cells->start[cells->cell_of[i] + 2]++;
     }
-    for (size_t c = 2; c < total + 2; c++)
-        cells->start[c] += cells->start[c - 1];
-    for (uint32_t i = 0; i < pairs->count; i++)
-        cells->member[cells->start[cells->cell_of[i] + 1]++] = i;
+    cell_grid_sort(cells->cell_of, pairs->count, total, cells->start, cells->member);
     return true;
 }
 

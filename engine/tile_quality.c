@@ -10,7 +10,7 @@
 
 typedef struct Sums {
     uint32_t count;
-    double density, density_sq, gradient_sq, force_sq, share, share_sq, nearest;
+    double density, density_sq, share, share_sq, nearest;
     double moment[3][3]; /* sum W d d^T */
 } Sums;
 

@@ -4,6 +4,7 @@
 #include "sim.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 /* ---- Making ---- */
 
@@ -74,23 +75,26 @@ static uint32_t cell_of(const StillWater *water, const float p[3]) {
 }
 
 static bool sort_column(StillWater *water, const WaterList *list, Err *err) {
-    const uint32_t cells = (uint32_t)(water->across * water->across * water->layers), n = list->water.count;
+    const size_t cells = (size_t)water->across * (size_t)water->across * (size_t)water->layers;
+    const uint32_t n = list->water.count;
     if (!buffer_reserve(&water->position, "column of water", n * sizeof(Float4), err) ||
         !buffer_reserve(&water->pressure, "pressure of the column", n * sizeof(float[2]), err) ||
-        !buffer_reserve(&water->start_buffer, "cells of the column", (cells + 2) * sizeof(uint32_t), err))
+        !buffer_reserve(&water->start_buffer, "cells of the column", (cells + 1) * sizeof(uint32_t), err))
         return false;
-    water->column = (RestFitted){n, water->position.data, water->pressure.data};
-    uint32_t *start = water->start_buffer.data;
+    uint32_t *cell = malloc(2 * (size_t)n * sizeof *cell);
+    if (cell == NULL)
+        return err_set(err, ERR_INPUT, "no memory to sort a column of %u particles", n);
     for (uint32_t i = 0; i < n; i++)
-        start[cell_of(water, list->water.position[i]) + 2]++;
-    for (uint32_t c = 0; c < cells; c++)
-        start[c + 2] += start[c + 1];
-    for (uint32_t i = 0; i < n; i++) {
-        const uint32_t to = start[cell_of(water, list->water.position[i]) + 1]++;
-        memcpy(water->column.position[to], list->water.position[i], sizeof(Float4));
-        memcpy(water->column.pressure[to], list->water.pressure[i], sizeof(float[2]));
+        cell[i] = cell_of(water, list->water.position[i]);
+    uint32_t *order = cell + n;
+    water->start = water->start_buffer.data;
+    cell_grid_sort(cell, n, cells, water->start, order);
+    water->column = (RestFitted){n, water->position.data, water->pressure.data};
+    for (uint32_t to = 0; to < n; to++) {
+        memcpy(water->column.position[to], list->water.position[order[to]], sizeof(Float4));
+        memcpy(water->column.pressure[to], list->water.pressure[order[to]], sizeof(float[2]));
     }
-    water->start = start;
+    free(cell);
     return true;
 }
 

@@ -8,12 +8,12 @@
  * water or walls is looked for. */
 #include "camera.h"
 
+#include "engine/base/angle.h"
+
 #include <math.h>
 #include <string.h>
 
 const char gfx_camera_kinds[] = "chase|fixed|orbit|top|bow";
-
-static const double pi = 3.14159265358979323846;
 
 GfxCameraDef gfx_camera_default(GfxCameraKind kind) {
     GfxCameraDef def = {.kind = kind,

@@ -49,10 +49,6 @@ static Filter make_filter(const Frame *frame) {
     return filter;
 }
 
-static int clamp_index(int i, int count) {
-    return i < 0 ? 0 : i >= count ? count - 1 : i;
-}
-
 static float clamp_part(float x) {
     x = x > 0.0f ? x : 0.0f;
     return x < 1.0f ? x : 1.0f;
@@ -100,10 +96,10 @@ static inline void smooth_lanes(const Filter *filter, const float *restrict from
             int off = (int)((float)i * lanes.stride[k] + 0.5f);
             float centre = lanes.centre[k], range = lanes.range[k], softness = lanes.softness[k];
             float weight = weights[lanes.taps[k] * (TAPS + 1) + i];
-            int before = along_x ? row + clamp_index(x + k - off, width)
-                                 : clamp_index(y - off, height) * width + x + k;
-            int after = along_x ? row + clamp_index(x + k + off, width)
-                                : clamp_index(y + off, height) * width + x + k;
+            int before =
+                along_x ? row + pass_clamp(x + k - off, width) : pass_clamp(y - off, height) * width + x + k;
+            int after =
+                along_x ? row + pass_clamp(x + k + off, width) : pass_clamp(y + off, height) * width + x + k;
             float a = from[before] - centre, b = from[after] - centre;
             float counts_a = weight * clamp_part((a + range) * softness + 1.0f);
             float counts_b = weight * clamp_part((b + range) * softness + 1.0f);
@@ -137,9 +133,9 @@ static void clean(const Filter *filter, const float *restrict from, float *restr
     for (int y = 0; y < filter->height; y++) {
         const float *rows[3];
         for (int j = 0; j < 3; j++)
-            rows[j] = from + (size_t)clamp_index(y + 2 * (j - 1), filter->height) * (size_t)width;
+            rows[j] = from + (size_t)pass_clamp(y + 2 * (j - 1), filter->height) * (size_t)width;
         for (int x = 0; x < width; x++) {
-            const int columns[3] = {clamp_index(x - 2, width), x, clamp_index(x + 2, width)};
+            const int columns[3] = {pass_clamp(x - 2, width), x, pass_clamp(x + 2, width)};
             float centre = rows[1][x], sum = centre, total = 1.0f;
             for (int j = 0; j < 3; j++)
                 for (int i = 0; i < 3; i++) {

@@ -30,14 +30,10 @@ static inline float most(float a, float b) {
     return a > b ? a : b;
 }
 
-static int clamp_index(int i, int count) {
-    return i < 0 ? 0 : i >= count ? count - 1 : i;
-}
-
 /* Of row y, or the nearest there is, with one more pixel at both ends. */
 static void fill_luminance(const Picture *picture, int y, float *out) {
     const uint8_t(*row)[4] =
-        picture->pixels + (size_t)clamp_index(y, picture->height) * (size_t)picture->width;
+        picture->pixels + (size_t)pass_clamp(y, picture->height) * (size_t)picture->width;
     for (int x = 0; x < picture->width; x++)
         out[x + 1] = 0.299f * (float)row[x][0] + 0.587f * (float)row[x][1] + 0.114f * (float)row[x][2];
     out[0] = out[1];
@@ -47,8 +43,8 @@ static void fill_luminance(const Picture *picture, int y, float *out) {
 /* Between pixels, `x` and `y` counted from the centre of the first. */
 static void sample(const Picture *picture, float x, float y, float rgb[3]) {
     float left = floorf(x), low = floorf(y), part_x = x - left, part_y = y - low;
-    int x0 = clamp_index((int)left, picture->width), x1 = clamp_index((int)left + 1, picture->width);
-    int y0 = clamp_index((int)low, picture->height), y1 = clamp_index((int)low + 1, picture->height);
+    int x0 = pass_clamp((int)left, picture->width), x1 = pass_clamp((int)left + 1, picture->width);
+    int y0 = pass_clamp((int)low, picture->height), y1 = pass_clamp((int)low + 1, picture->height);
     const uint8_t(*below)[4] = picture->pixels + (size_t)y0 * (size_t)picture->width;
     const uint8_t(*above)[4] = picture->pixels + (size_t)y1 * (size_t)picture->width;
     for (int k = 0; k < 3; k++) {

@@ -24,39 +24,12 @@ struct Gfx {
 static const char *const backend_names[GFX_BACKEND_COUNT] = {"auto", "egl-device", "egl", "osmesa"};
 static const char *const look_names[GFX_LOOK_COUNT] = {"water", "particles"};
 
-/* Index of `name`, or -1 with the words that are possible. */
-static int find_name(const char *what, const char *name, const char *const *names, int count, Err *err) {
-    char words[128] = "";
-    for (int i = 0; i < count; i++) {
-        if (strcmp(name, names[i]) == 0)
-            return i;
-        size_t length = strlen(words);
-        snprintf(words + length, sizeof words - length, "%s%s", i ? ", " : "", names[i]);
-    }
-    err_set(err, ERR_USAGE, "unknown %s '%s'; possible are: %s", what, name, words);
-    return -1;
-}
-
 const char *gfx_backend_name(GfxBackend backend) {
     return backend_names[backend];
 }
 
-bool gfx_backend_parse(const char *name, GfxBackend *backend, Err *err) {
-    int i = find_name("way to OpenGL", name, backend_names, GFX_BACKEND_COUNT, err);
-    if (i >= 0)
-        *backend = (GfxBackend)i;
-    return i >= 0;
-}
-
 const char *gfx_look_name(GfxLook look) {
     return look_names[look];
-}
-
-bool gfx_look_parse(const char *name, GfxLook *look, Err *err) {
-    int i = find_name("look", name, look_names, GFX_LOOK_COUNT, err);
-    if (i >= 0)
-        *look = (GfxLook)i;
-    return i >= 0;
 }
 
 /* ---- Defaults ---- */

@@ -46,8 +46,6 @@ typedef enum GfxBackend {
 
 /* "auto", "egl-device", "egl", "osmesa": the words of `--gl`. */
 const char *gfx_backend_name(GfxBackend backend);
-/* False with ERR_USAGE and the list of words. */
-bool gfx_backend_parse(const char *name, GfxBackend *backend, Err *err);
 
 typedef enum GfxLook {
     GFX_LOOK_WATER,     /* a water surface with foam and spray, in an endless ocean where there is one */
@@ -57,7 +55,6 @@ typedef enum GfxLook {
 
 /* "water", "particles". */
 const char *gfx_look_name(GfxLook look);
-bool gfx_look_parse(const char *name, GfxLook *look, Err *err);
 
 enum { GFX_SIZE_MIN = 16, GFX_SIZE_MAX = 8192, GFX_SUPERSAMPLE_MAX = 4 };
 
@@ -94,7 +91,7 @@ typedef enum GfxMaterialKind {
     GFX_MATERIAL_HULL, /* a boat's paint: antifouling, boot stripe, topsides in `color`, wooden deck, cabin */
     GFX_MATERIAL_STONE, /* quays, rocks, the sea's ground: `color` with grain and joints */
     GFX_MATERIAL_TANK,  /* a closed container seen from outside through its near walls: far walls and floor
-                           tiled in  `color`, edges as lines */
+                           tiled in `color`, edges as lines */
     GFX_MATERIAL_COUNT
 } GfxMaterialKind;
 

@@ -22,7 +22,7 @@ typedef struct FrameBlock {
     float fluid_size[4];  /* of the fluid's images, alike */
     float sun[4];         /* unit; [3]: farthest depth at which the still surface serves as reference, m */
     float sphere[4];      /* radius of a particle as drawn, m; part of it by which it is lowered; px of 1 m at
-                             depth 1 m      in the full image; spacing, m */
+                             depth 1 m in the full image; spacing, m */
     float edge_box[4];    /* local x, z -> texture coordinates of the edge distance: offset, scale */
     float foam_box[4];    /* the same for the ocean's foam */
     float edge[4];        /* blend from, to, m; 1: there is an ocean; 1: there is a ground */
@@ -109,6 +109,11 @@ bool images_show(Frame *frame, ImageId id, uint8_t *rgb, Err *err);
 /* Depth at which the ray through pixel (x, y) of an image meets still water: plane_depth of
  * shaders/frame.glsl. */
 float pass_still_depth(const FrameBlock *block, int x, int y, int width, int height);
+
+/* The nearest of `count` rows or columns. */
+static inline int pass_clamp(int i, int count) {
+    return i < 0 ? 0 : i >= count ? count - 1 : i;
+}
 
 /* Draws one triangle over the whole target, with depth test, depth writes and blending off. */
 void pass_fill(const Frame *frame);

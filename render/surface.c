@@ -10,6 +10,8 @@
  * particles far away only make the cells larger: more is drawn, never less. */
 #include "surface.h"
 
+#include "engine/base/random.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -176,12 +178,9 @@ static bool is_alone(const Cells *cells, const float p[3]) {
 
 /* ---- Droplets ---- */
 
-/* A counter-based random number in [0, 1): splitmix64's finaliser of id and draw. */
+/* From [0, 1): the same droplets in every frame. */
 static float random_part(uint64_t id, uint64_t draw) {
-    uint64_t z = (id * 128 + draw + 1) * 0x9e3779b97f4a7c15u;
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return (float)((z ^ (z >> 31)) >> 40) * 0x1p-24f;
+    return (float)(random_bits(0, id * 128 + draw) >> 40) * 0x1p-24f;
 }
 
 static void add_droplets(SurfaceList *list, const GfxParticles *particles, uint32_t i) {

@@ -84,7 +84,7 @@ bool file_begin(FileWriter *writer, const char *path, Err *err) {
     memcpy(writer->temporary + length, ".tmp", sizeof ".tmp");
     writer->stream = fopen(writer->temporary, "wbe");
     if (!writer->stream)
-        return err_set(err, ERR_IO, "%s: cannot write: %s", writer->temporary, strerror(errno));
+        return err_set(err, ERR_IO, "%s: cannot write: %s", path, strerror(errno));
     return true;
 }
 
@@ -161,6 +161,29 @@ bool file_make_directory(const char *path, Err *err) {
         part[i] = end;
     }
     return true;
+}
+
+bool file_check_directory(const char *path, Err *err) {
+    char part[4096];
+    struct stat status = {0};
+    size_t length = strlen(path);
+    if (length == 0 || length >= sizeof part)
+        return err_set(err, ERR_IO, "%.64s...: cannot make directory: %s", path,
+                       strerror(length == 0 ? ENOENT : ENAMETOOLONG));
+    memcpy(part, path, length + 1);
+    /* down to what is there */
+    while (stat(part, &status) != 0 && strcmp(part, ".") != 0) {
+        char *slash = strrchr(part, '/');
+        if (!slash)
+            strcpy(part, ".");
+        else
+            slash[slash == part ? 1 : 0] = '\0';
+    }
+    if (!S_ISDIR(status.st_mode))
+        errno = ENOTDIR;
+    else if (access(part, W_OK | X_OK) == 0)
+        return true;
+    return err_set(err, ERR_IO, "%s: cannot write: %s", part, strerror(errno));
 }
 
 bool file_exists(const char *path) {

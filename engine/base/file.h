@@ -14,7 +14,8 @@
 bool file_read(const char *path, size_t max_size, char **data, size_t *size, Err *err);
 
 /* Opens `path`.tmp for writing (binary). file_commit flushes, fsyncs, closes and renames it to `path`;
- * file_abort removes it. */
+ * file_abort removes it. ERR_IO when one of these fails, a write before the commit included: no file is left
+ * then but an older `path`. */
 typedef struct FileWriter {
     FILE *stream;
     char path[4096];
@@ -25,11 +26,15 @@ bool file_begin(FileWriter *writer, const char *path, Err *err);
 bool file_commit(FileWriter *writer, Err *err);
 void file_abort(FileWriter *writer);
 
-/* Writes `size` bytes as one atomic file. */
+/* Writes `size` bytes as one atomic file. ERR_IO. */
 bool file_write(const char *path, const void *data, size_t size, Err *err);
 
-/* Creates a directory and its parents; fine when it exists. */
+/* Creates a directory and its parents; fine when it exists. ERR_IO. */
 bool file_make_directory(const char *path, Err *err);
+/* Whether files could be written into a directory that is there or could be made. Changes nothing, and cannot
+ * know everything: a disk may be full. ERR_IO. */
+bool file_check_directory(const char *path, Err *err);
+/* Anything of that name. */
 bool file_exists(const char *path);
 
 #endif

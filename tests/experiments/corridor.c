@@ -6,12 +6,14 @@
  * can take. */
 #include "experiment.h"
 
-#include "app/scene.h"
+#include "app/carensac.h"
+#include "app/reproduce.h"
 
 enum { CLOSED, OPEN, SIDE_COUNT, MAX_STEPS = 4096, MAX_EDITS = 8 };
 
+static const char scene_file[] = SKIFF_SOURCE_DIR "/assets/scenes/wedge.json";
 static const double radius_default = 0.05, duration = 6.0;
-static const double length = 5.0, layer = 0.5;        /* m, of a half; that absorbs */
+static const double length = 5.0;                     /* m, of a half */
 static const double wave_from = 1.3;                  /* s; the first wave reaches the end */
 static const double first_from = 1.9, first_to = 2.7; /* s; it has come back from a closed one */
 static const double rest_from = 5.85, rest_to = 5.95; /* s */
@@ -25,20 +27,22 @@ typedef struct Corridor {
 } Corridor;
 
 static SkiffSim *start(const Experiment *experiment, const char *const *edits, int edit_count) {
-    enum { OWN = 4 };
+    enum { OWN = 2 + REPRODUCE_LAYER_EDITS };
     const double r = experiment->radius;
-    char texts[OWN][64];
+    char texts[OWN][REPRODUCE_EDIT_SIZE];
     const char *all[MAX_EDITS];
+    Err err = {0};
+    Scene *shipped = scene_load(scene_file, NULL, 0, &err);
+    experiment_need(shipped != NULL, &err);
     snprintf(texts[0], sizeof texts[0], "particleRadius=%.9g", r);
-    snprintf(texts[1], sizeof texts[1], "timeStepSize=%.9g", 0.003 * r / 0.025);
-    snprintf(texts[2], sizeof texts[2], "outflowDistance=%.9g", layer / r);
-    snprintf(texts[3], sizeof texts[3], "inflowLayer=%.9g", layer / r);
+    snprintf(texts[1], sizeof texts[1], "timeStepSize=%.9g", carensac_time_step(r));
+    reproduce_keep_layer(shipped, r, texts + 2);
+    scene_free(shipped);
     for (int k = 0; k < OWN; k++)
         all[k] = texts[k];
     for (int k = 0; k < edit_count; k++)
         all[OWN + k] = edits[k];
-    Err err = {0};
-    Scene *scene = scene_load(SKIFF_SOURCE_DIR "/assets/scenes/wedge.json", all, OWN + edit_count, &err);
+    Scene *scene = scene_load(scene_file, all, OWN + edit_count, &err);
     experiment_need(scene != NULL, &err);
     SkiffSim *sim = scene_start(scene, experiment->threads, SKIFF_SIMD_AUTO, &err);
     experiment_need(sim != NULL, &err);

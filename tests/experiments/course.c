@@ -3,7 +3,9 @@
  * --radius 0.025. */
 #include "experiment.h"
 
+#include "app/carensac.h"
 #include "app/pilot.h"
+#include "app/reproduce.h"
 
 static const char *const scene_file = SKIFF_SOURCE_DIR "/assets/scenes/boat-cylinder-5m.json";
 static const double radius_default = 0.1;
@@ -26,7 +28,7 @@ static Course begin(const Experiment *experiment, const char *input) {
     char texts[2][64], path[4096];
     const char *edits[2] = {texts[0], texts[1]};
     snprintf(texts[0], sizeof texts[0], "particleRadius=%.9g", experiment->radius);
-    snprintf(texts[1], sizeof texts[1], "timeStepSize=%.9g", 0.003 * experiment->radius / 0.025);
+    snprintf(texts[1], sizeof texts[1], "timeStepSize=%.9g", carensac_time_step(experiment->radius));
     snprintf(path, sizeof path, SKIFF_SOURCE_DIR "/assets/inputs/%s.input", input);
     course.scene = scene_load(scene_file, edits, 2, &err);
     experiment_need(course.scene && pilot_read(&course.pilot, course.scene, path, NULL, &err), &err);
@@ -38,7 +40,7 @@ static Course begin(const Experiment *experiment, const char *input) {
 }
 
 static double degrees(double angle) {
-    return angle * 180.0 / EXPERIMENT_PI;
+    return angle * 180.0 / pi;
 }
 
 static void advance(Course *course) {
@@ -47,10 +49,9 @@ static void advance(Course *course) {
     experiment_step(course->sim);
     const SkiffStats *stats = skiff_stats(course->sim);
     const SkiffBody boat = skiff_body(course->sim, 0);
-    const double *q = boat.rotation, rise = -2.0 * (q[0] * q[1] + q[2] * q[3]);
     const double iterations = stats->density_iterations + stats->divergence_iterations;
     course->drive = skiff_drive(course->sim, 0);
-    course->bow_up = degrees(asin(fmax(-1.0, fmin(1.0, rise))));
+    course->bow_up = reproduce_bow_up(&boat);
     course->count = stats->particles;
     course->iterations += (iterations - course->iterations) / (double)stats->step;
     if (stats->step % 10 == 0)

@@ -48,7 +48,8 @@ static void simulate(const Experiment *experiment) {
     SkiffDef def = experiment_def(experiment, 0.0125f, 0.001f);
     const float r = def.params.particle_radius;
     def.params.volume_factor = 1.0f;
-    def.params.escape = 1; /* splashes over the rim are lost, as in the experiment; they are counted below */
+    def.params.escape = SKIFF_ESCAPE_REMOVE; /* splashes over the rim are lost, as in the experiment; they are
+                                                counted below */
     experiment_tank(&def, 3.22f, 1.0f, 1.0f);
     const float gap = EXPERIMENT_GAP * r, width = 1.0f - 2.0f * gap, length = 1.228f - gap;
     const int nx = (int)(length / (2 * r) + 0.5f), nz = (int)(width / (2 * r) + 0.5f);

@@ -10,6 +10,7 @@
 #ifndef EXPERIMENT_H
 #define EXPERIMENT_H
 
+#include "base/angle.h"
 #include "base/file.h"
 #include "skiff.h"
 
@@ -19,8 +20,7 @@
 #include <string.h>
 #include <time.h>
 
-#define EXPERIMENT_PI 3.14159265358979323846
-#define EXPERIMENT_G  9.81 /* m/s^2, the default gravity of the engine */
+#define EXPERIMENT_G 9.81 /* m/s^2, the default gravity of the engine */
 
 typedef struct Experiment {
     const char *name;

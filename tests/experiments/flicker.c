@@ -53,7 +53,7 @@ typedef struct Means {
 
 /* 0: inner water, 1: band, -1: neither. The boat is in the middle, the camera turns with it. */
 static int part_of(double x, double y, int *sector) {
-    double far = hypot(x, y), turn = atan2(y, x) / (2 * EXPERIMENT_PI) + 0.5;
+    double far = hypot(x, y), turn = atan2(y, x) / (2 * pi) + 0.5;
     *sector = (int)(turn * SECTORS) % SECTORS;
     return far >= inner[0] && far < inner[1] ? 0 : far >= band[0] && far < band[1] ? 1 : -1;
 }
@@ -108,8 +108,7 @@ int main(int argc, char **argv) {
     Err err = {0};
     experiment_need(file_make_directory(run, &err), &err);
     snprintf(path, sizeof path, "%s/scene.json", run);
-    snprintf(text, sizeof text, scene_text, radius, SKIFF_SOURCE_DIR,
-             half_view / tan(20 * EXPERIMENT_PI / 180));
+    snprintf(text, sizeof text, scene_text, radius, SKIFF_SOURCE_DIR, half_view / tan(20 * pi / 180));
     write_file(path, text);
     snprintf(path, sizeof path, "%s/cruise.input", run);
     write_file(path, "0.2 throttle 1\n0.2 heading 0\n");

@@ -59,12 +59,12 @@ static Floating float_box(const Experiment *experiment, double ratio, FileWriter
         const double *q = state.rotation;
         const double up = 1.0 - 2.0 * (q[0] * q[0] + q[2] * q[2]), low = state.position[1] - 0.2;
         fprintf(series->stream, "%g,%.5g,%.5g,%.5g,%.5g,%.4g\n", ratio, skiff_time(sim), state.position[1],
-                surface, surface - low, 180.0 / EXPERIMENT_PI * acos(fmin(up, 1.0)));
+                surface, surface - low, 180.0 / pi * acos(fmin(up, 1.0)));
         if (skiff_time(sim) < 5.0)
             continue;
         mean.draft += surface - low;
         mean.level += surface;
-        mean.tilt_deg += 180.0 / EXPERIMENT_PI * acos(fmin(up, 1.0));
+        mean.tilt_deg += 180.0 / pi * acos(fmin(up, 1.0));
         mean.wander = fmax(mean.wander, hypot(state.position[0] - 0.6, state.position[2] - 0.6));
         mean.force_y += state.force[1];
         count++;

@@ -62,7 +62,7 @@ static SkiffSim *make_balanced(const Experiment *experiment) {
     double centre = 0.70;
     SkiffSim *sim = make(experiment, centre);
     for (int k = 0; k < 3; k++) {
-        const double inside = width - 2.0 * layer, submerged = 2.0 / 3.0 * EXPERIMENT_PI * pow(radius, 3);
+        const double inside = width - 2.0 * layer, submerged = 2.0 / 3.0 * pi * pow(radius, 3);
         const double water = skiff_particles(sim).count * experiment_particle_volume(sim);
         const double level = layer + (water + submerged) / (inside * inside);
         centre = level + balance_offset(layer) + push;

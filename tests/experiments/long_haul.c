@@ -6,6 +6,8 @@
  * line fitted over the run but for its first 100 m, times its length. */
 #include "experiment.h"
 
+#include "app/carensac.h"
+
 static const double radius_default = 0.2, distance = 1000.0, warm_up = 100.0; /* m */
 static const double hash_after = 200.0;                                       /* m */
 static const double scale = 2.0, thrust = 20000.0, level = 2.0;               /* N, m */
@@ -31,9 +33,9 @@ static SkiffSim *make(const Experiment *experiment, int threads, double start) {
     const double r = experiment->radius;
     def.threads = threads;
     def.params.particle_radius = (float)r;
-    def.params.time_step = (float)(0.003 * r / 0.025);
+    def.params.time_step = (float)carensac_time_step(r);
     def.params.boundary_offset = 1.15f;
-    def.params.escape = 1;
+    def.params.escape = SKIFF_ESCAPE_REMOVE;
     def.tank.geometry.kind = SKIFF_GEOMETRY_CYLINDER;
     def.tank.geometry.radius = 6.0f;
     def.tank.geometry.height = 5.0f;

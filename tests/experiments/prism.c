@@ -19,7 +19,7 @@ int main(int argc, char **argv) {
                                         (const float[3]){1.0f, 0.75f, 0.43f}, 600.0f);
     const float axis[3] = {0, 0, 1};
     memcpy(prism.geometry.rotation_axis, axis, sizeof axis);
-    prism.geometry.rotation_angle = (float)(30.0 / 180.0 * EXPERIMENT_PI);
+    prism.geometry.rotation_angle = (float)(30.0 / 180.0 * pi);
     prism.free_axes = SKIFF_FREE_Y | SKIFF_FREE_RZ;
     prism.release_time = 2.0;
     def.blocks = &block;
@@ -34,7 +34,7 @@ int main(int argc, char **argv) {
     while (skiff_time(sim) < 16.0 - 1e-9) {
         experiment_step(sim);
         const SkiffBody body = skiff_body(sim, 0);
-        const double angle = 30.0 + 360.0 / EXPERIMENT_PI * atan2(body.rotation[2], body.rotation[3]);
+        const double angle = 30.0 + 360.0 / pi * atan2(body.rotation[2], body.rotation[3]);
         if (skiff_step_count(sim) % 10 == 0)
             fprintf(series.stream, "%.5g,%.5g,%.5g\n", skiff_time(sim), angle, body.position[1]);
         if (skiff_time(sim) <= 13.0)

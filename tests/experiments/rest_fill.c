@@ -120,7 +120,7 @@ static void case_make(Case *it, const Experiment *experiment, const TankKind *ta
     for (int k = 0; k < 3; k++)
         it->body.geometry.size[k] = tank->body_edge * r;
     memcpy(it->body.geometry.rotation_axis, (float[]){1, 0, 0}, sizeof it->body.geometry.rotation_axis);
-    it->body.geometry.rotation_angle = (float)(EXPERIMENT_PI / 4);
+    it->body.geometry.rotation_angle = (float)(pi / 4);
     it->body.geometry.translation[1] = it->level;
     it->body.density = floating_density(tank->body_edge);
     it->body.free_axes = SKIFF_FREE_ALL;
@@ -199,7 +199,7 @@ static void float_cube(Experiment *experiment, float scale, float density) {
     const float size[3] = {2 * scale, 2 * scale, 2 * scale}, centre[3] = {0, level, 0};
     SkiffBodyDef body = experiment_box("cube", size, centre, density);
     memcpy(body.geometry.rotation_axis, (float[]){1, 0, 0}, sizeof body.geometry.rotation_axis);
-    body.geometry.rotation_angle = (float)(EXPERIMENT_PI / 4);
+    body.geometry.rotation_angle = (float)(pi / 4);
     body.free_axes = SKIFF_FREE_ALL;
     def.bodies = &body;
     def.body_count = 1;
@@ -211,7 +211,7 @@ static void float_cube(Experiment *experiment, float scale, float density) {
     while (skiff_time(sim) < 3.0 - 1e-9) {
         experiment_step(sim);
         const SkiffBody cube = skiff_body(sim, 0);
-        const double degrees = 2.0 * 180.0 / EXPERIMENT_PI; /* of half the angle, which is small */
+        const double degrees = 2.0 * 180.0 / pi; /* of half the angle, which is small */
         const double now[3] = {(cube.position[1] - (double)level) / (double)def.params.particle_radius,
                                degrees * cube.rotation[0], degrees * cube.rotation[2]};
         for (int k = 0; k < 3; k++)

@@ -46,7 +46,7 @@ static SkiffGeometryDef random_geometry(Dice *dice, float least, float most) {
         geometry.scale[k] = roll(dice, 0.8f, 1.25f);
         geometry.rotation_axis[k] = roll(dice, -1.0f, 1.0f);
     }
-    geometry.rotation_angle = roll(dice, 0.0f, (float)EXPERIMENT_PI);
+    geometry.rotation_angle = roll(dice, 0.0f, (float)pi);
     return geometry;
 }
 

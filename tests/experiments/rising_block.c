@@ -20,7 +20,8 @@
 #define EXPERIMENT_OFFSET 1.15f /* bodies displace what they are, not a layer of water more */
 #include "experiment.h"
 
-enum { MAX_STEPS = 4000 };
+static const double radius_default = 0.00125;
+enum { MAX_STEPS = 16000 };
 
 static double t[MAX_STEPS], y[MAX_STEPS];
 
@@ -61,10 +62,14 @@ static double height_at(const double *times, const double *heights, int count, d
     return heights[count - 1];
 }
 
+static int layers(float length, float r) {
+    return (int)lroundf(length / (2 * r));
+}
+
 static int simulate(const Experiment *experiment) {
-    SkiffDef def = experiment_def(experiment, 0.00125f, 0.0008f);
+    const float r = (float)experiment->radius, gap = EXPERIMENT_GAP * r;
+    SkiffDef def = experiment_def(experiment, r, 0.64f * r);
     def.params.volume_factor = 1.0f;
-    const float r = def.params.particle_radius, gap = EXPERIMENT_GAP * r;
     experiment_tank(&def, 0.150f, 0.14f, 0.140f);
     def.tank.open = false;
     SkiffBodyDef body = experiment_box("block", (const float[3]){0.049f, 0.024f, 0.048f},
@@ -73,9 +78,10 @@ static int simulate(const Experiment *experiment) {
     def.bodies = &body;
     def.body_count = 1;
     def.block_count = 1;
-    /* what the experiment gives is the depth, so the depth is met: a gap and 21 layers reach 52.6 mm, and
-     * they fill the tank from wall to wall */
-    const SkiffBlockDef block = experiment_block(&def, 60, 21, 56);
+    /* what the experiment gives is the depth, so the depth is met: a gap and 52.5 mm of layers, from wall to
+     * wall */
+    const SkiffBlockDef block =
+        experiment_block(&def, layers(0.150f, r), layers(0.0525f, r), layers(0.140f, r));
     def.blocks = &block;
     SkiffSim *sim = experiment_create(&def);
     printf("%u particles, surface at %.1f mm\n", skiff_particles(sim).count, 1e3 * (double)block.end[1]);
@@ -90,7 +96,7 @@ static int simulate(const Experiment *experiment) {
 }
 
 int main(int argc, char **argv) {
-    Experiment experiment = experiment_begin("rising_block", argc, argv);
+    Experiment experiment = experiment_begin_sized("rising_block", radius_default, argc, argv);
     const ExperimentCurve wu = experiment_curve("04_wu2014_floating_box_rise.csv", NULL, 0, 1);
     if (experiment.solver < 0)
         experiment.solver = SKIFF_SOLVER_SPLIT;

@@ -109,12 +109,11 @@ static void wave(Experiment *experiment, const Case *wanted) {
     SkiffSim *sim = experiment_create(&def);
     experiment_run(sim, 4.0);
     const ExperimentColumn column = experiment_column(sim);
-    const Mode mode = {.k = EXPERIMENT_PI / column.width_x,
+    const Mode mode = {.k = pi / column.width_x,
                        .depth = column.height,
                        .left = 0.5 * ((double)length - column.width_x),
                        .floor = column.floor};
-    const double omega = sqrt(EXPERIMENT_G * mode.k * tanh(mode.k * mode.depth)),
-                 expected = 2 * EXPERIMENT_PI / omega;
+    const double omega = sqrt(EXPERIMENT_G * mode.k * tanh(mode.k * mode.depth)), expected = 2 * pi / omega;
     const double speed = wanted->amplitude * mode.depth * omega;
     mode_add(&mode, sim, speed);
     static double q[MAX_STEPS];

@@ -3,6 +3,9 @@
  * back from the walls of the tank (shallow water: sqrt(g h), to the side and back about 3.6 s). */
 #include "experiment.h"
 
+#include "app/carensac.h"
+#include "app/reproduce.h"
+
 enum { CELLS = 15, HALF = CELLS / 2 }; /* cells of the map of the surface, to a side */
 
 static const double radius_default = 0.06, level = 0.9, window_radius = 2.5; /* m */
@@ -22,9 +25,9 @@ static SkiffSim *make(const Experiment *experiment, bool window) {
     const double r = experiment->radius;
     def.threads = experiment->threads;
     def.params.particle_radius = (float)r;
-    def.params.time_step = (float)(0.003 * r / 0.025);
+    def.params.time_step = (float)carensac_time_step(r);
     def.params.boundary_offset = 1.15f;
-    def.params.escape = 1;
+    def.params.escape = SKIFF_ESCAPE_REMOVE;
     def.tank.geometry.kind = SKIFF_GEOMETRY_CYLINDER;
     def.tank.geometry.radius = (float)((window ? 1.0 : 2.0) * window_radius);
     def.tank.geometry.height = 3.0f;
@@ -82,10 +85,9 @@ static Twin run(const Experiment *experiment, bool window) {
         }
     }
     const SkiffBody hull = skiff_body(sim, 0);
-    const double *q = hull.rotation;
     twin.drag /= steps;
     twin.rise = hull.position[1];
-    twin.trim = asin(-2.0 * (q[0] * q[1] + q[2] * q[3])) * 180.0 / EXPERIMENT_PI;
+    twin.trim = reproduce_bow_up(&hull);
     twin.count = skiff_particles(sim).count;
     for (int k = 0; k < CELLS * CELLS; k++)
         twin.height[k / CELLS][k % CELLS] /= maps;

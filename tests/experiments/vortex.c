@@ -64,7 +64,7 @@ int main(int argc, char **argv) {
     experiment_need(skiff_save(sim, path, &err), &err);
     const ExperimentColumn column = experiment_column(sim);
     const double width = 0.5 * (column.width_x + column.width_z);
-    const Vortex vortex = {.k = EXPERIMENT_PI / width, .left = {0.5 - 0.5 * width, 0.5 - 0.5 * width}};
+    const Vortex vortex = {.k = pi / width, .left = {0.5 - 0.5 * width, 0.5 - 0.5 * width}};
     const double step = (double)STEPS_A_POINT * 0.003;
 
     const double speeds[SPEEDS] = {0.03, 0.1, 0.3};

@@ -43,7 +43,7 @@ static SkiffSim *make_sea(int threads, SkiffSimd simd, double start, bool has_fi
     def.params.time_step = 0.005f;
     def.params.sea_steps = 10;
     def.params.rest_steps = 4;
-    def.params.escape = 1;
+    def.params.escape = SKIFF_ESCAPE_REMOVE;
     def.tank.geometry.kind = SKIFF_GEOMETRY_STAR;
     def.tank.geometry.branches = 5;
     def.tank.geometry.radius = 1.1f;

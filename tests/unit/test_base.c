@@ -13,27 +13,7 @@
 #include <fcntl.h>
 #include <sys/stat.h>
 
-static char folder[] = "/tmp/skiff-test-base-XXXXXX";
-
-static const char *in_folder(const char *name) {
-    static char paths[4][512];
-    static int next;
-    char *path = paths[next++ % 4];
-    snprintf(path, sizeof paths[0], "%s/%s", folder, name);
-    return path;
-}
-
-static int make_folder(void **state) {
-    (void)state;
-    return mkdtemp(folder) ? 0 : -1;
-}
-
-static int remove_folder(void **state) {
-    (void)state;
-    char command[128];
-    snprintf(command, sizeof command, "rm -rf '%s'", folder);
-    return system(command);
-}
+#include "scratch.h"
 
 /* ---- err ---- */
 
@@ -177,17 +157,15 @@ static void memory_numbers_are_plausible(void **state) {
 
 static void put(const char *name, const char *text) {
     char path[600];
-    snprintf(path, sizeof path, "%s", in_folder(name));
+    snprintf(path, sizeof path, "%s", name);
     *strrchr(path, '/') = '\0';
     assert_true(file_make_directory(path, NULL));
-    assert_true(file_write(in_folder(name), text, strlen(text), NULL));
+    assert_true(file_write(name, text, strlen(text), NULL));
 }
 
 static void memory_obeys_the_tightest_group(void **state) {
     (void)state;
-    char v2[512], v1[512];
-    snprintf(v2, sizeof v2, "%s", in_folder("v2"));
-    snprintf(v1, sizeof v1, "%s", in_folder("v1"));
+    static const char v2[] = "v2", v1[] = "v1";
     put("v2/proc/meminfo", "MemTotal:       9000000 kB\nMemFree:  1 kB\nMemAvailable:    8000000 kB\n");
     assert_true(available_under(v2) == (size_t)8000000 * 1024);
     put("v2/proc/self/cgroup", "0::/outer/inner\n");
@@ -227,7 +205,7 @@ static void assert_file(const char *path, const char *text) {
 static void file_round_trip(void **state) {
     (void)state;
     Err err = {0};
-    const char *path = in_folder("a.txt");
+    const char *path = "a.txt";
     assert_true(file_write(path, "first", 5, &err));
     assert_file(path, "first");
     assert_true(file_write(path, "", 0, &err));
@@ -269,15 +247,15 @@ static void file_read_says_what_is_wrong(void **state) {
     char *data = NULL;
     size_t size = 0;
     Err err = {0};
-    assert_false(file_read(in_folder("none"), 100, &data, &size, &err));
+    assert_false(file_read("none", 100, &data, &size, &err));
     assert_int_equal(err.code, ERR_INPUT);
-    assert_non_null(strstr(err.message, "/none: cannot open: No such file"));
-    assert_false(file_read(folder, 100, &data, &size, &err));
+    assert_non_null(strstr(err.message, "none: cannot open: No such file"));
+    assert_false(file_read(scratch_folder, 100, &data, &size, &err));
     assert_int_equal(err.code, ERR_INPUT);
     assert_non_null(strstr(err.message, "is a directory"));
     /* A pipe nobody writes to must not be waited for. */
-    assert_int_equal(mkfifo(in_folder("pipe"), 0600), 0);
-    assert_false(file_read(in_folder("pipe"), 100, &data, &size, &err));
+    assert_int_equal(mkfifo("pipe", 0600), 0);
+    assert_false(file_read("pipe", 100, &data, &size, &err));
     assert_int_equal(err.code, ERR_INPUT);
     assert_non_null(strstr(err.message, "not a regular file"));
     assert_null(data);
@@ -287,7 +265,7 @@ static void file_is_seen_only_when_committed(void **state) {
     (void)state;
     Err err = {0};
     FileWriter writer;
-    const char *path = in_folder("b.txt"), *temporary = in_folder("b.txt.tmp");
+    const char *path = "b.txt", *temporary = "b.txt.tmp";
     assert_true(file_write(path, "old", 3, &err));
 
     assert_true(file_begin(&writer, path, &err));
@@ -310,12 +288,12 @@ static void file_is_seen_only_when_committed(void **state) {
 static void file_write_failures_leave_nothing(void **state) {
     (void)state;
     Err err = {0};
-    assert_false(file_write(in_folder("no/such/folder/x"), "a", 1, &err));
+    assert_false(file_write("no/such/folder/x", "a", 1, &err));
     assert_int_equal(err.code, ERR_IO);
     assert_non_null(strstr(err.message, "No such file"));
-    assert_false(file_write(folder, "a", 1, &err));
+    assert_false(file_write(scratch_folder, "a", 1, &err));
     assert_non_null(strstr(err.message, "Is a directory"));
-    assert_false(file_write(in_folder("slash/"), "a", 1, &err));
+    assert_false(file_write("slash/", "a", 1, &err));
     assert_false(file_write("", "a", 1, &err));
 
     static char name[8192];
@@ -326,7 +304,7 @@ static void file_write_failures_leave_nothing(void **state) {
 
     /* A full disk: the temporary name leads to a device that takes nothing. The old file survives, the
      * temporary is gone. */
-    const char *path = in_folder("full.txt"), *temporary = in_folder("full.txt.tmp");
+    const char *path = "full.txt", *temporary = "full.txt.tmp";
     if (access("/dev/full", W_OK) != 0)
         return;
     static char bytes[100000];
@@ -345,12 +323,12 @@ static void file_write_failures_leave_nothing(void **state) {
 static void directories_with_parents(void **state) {
     (void)state;
     Err err = {0};
-    assert_true(file_make_directory(in_folder("p/q//r/"), &err));
-    assert_true(file_exists(in_folder("p/q/r")));
-    assert_true(file_make_directory(in_folder("p/q/r"), &err));
+    assert_true(file_make_directory("p/q//r/", &err));
+    assert_true(file_exists("p/q/r"));
+    assert_true(file_make_directory("p/q/r", &err));
     assert_true(file_make_directory("/", &err));
-    assert_true(file_write(in_folder("p/file"), "", 0, &err));
-    assert_false(file_make_directory(in_folder("p/file/sub"), &err));
+    assert_true(file_write("p/file", "", 0, &err));
+    assert_false(file_make_directory("p/file/sub", &err));
     assert_int_equal(err.code, ERR_IO);
     assert_non_null(strstr(err.message, "p/file: cannot make directory: Not a directory"));
     assert_false(file_make_directory("", &err));
@@ -358,6 +336,28 @@ static void directories_with_parents(void **state) {
     memset(name, 'a', sizeof name - 1);
     assert_false(file_make_directory(name, &err));
     assert_non_null(strstr(err.message, "name too long"));
+    assert_false(file_check_directory(name, &err));
+}
+
+static void directories_are_checked_beforehand(void **state) {
+    (void)state;
+    Err err = {0};
+    assert_true(file_make_directory("there", &err) && file_write("there/file", "", 0, &err));
+    static const char *const good[] = {"there", "there/", "there/a/b", "a", "a/", "./a", ".", "//tmp/a/"};
+    for (size_t i = 0; i < sizeof good / sizeof *good; i++)
+        if (!file_check_directory(good[i], &err))
+            fail_msg("%s: %s", good[i], err.message);
+    assert_false(file_exists("a") || file_exists("there/a"));
+    assert_false(file_check_directory("there/file/a/b", &err));
+    assert_int_equal(err.code, ERR_IO);
+    assert_string_equal(err.message, "there/file: cannot write: Not a directory");
+    assert_false(file_check_directory("", &err));
+    if (geteuid() == 0)
+        return; /* may write anywhere */
+    assert_int_equal(chmod("there", 0500), 0);
+    assert_false(file_check_directory("there/a", &err));
+    assert_string_equal(err.message, "there: cannot write: Permission denied");
+    assert_int_equal(chmod("there", 0700), 0);
 }
 
 /* ---- log ---- */
@@ -404,7 +404,8 @@ int main(void) {
         cmocka_unit_test(file_is_seen_only_when_committed),
         cmocka_unit_test(file_write_failures_leave_nothing),
         cmocka_unit_test(directories_with_parents),
+        cmocka_unit_test(directories_are_checked_beforehand),
         cmocka_unit_test(log_reaches_the_sink),
     };
-    return cmocka_run_group_tests_name("base", tests, make_folder, remove_folder);
+    return cmocka_run_group_tests_name("base", tests, scratch_enter, scratch_leave);
 }

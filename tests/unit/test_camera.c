@@ -1,5 +1,6 @@
 /* Cameras: where they look, that smoothing does not depend on the frame rate, and that a boat far away is
  * looked at as steadily as one at the origin. */
+#include "engine/base/angle.h"
 #include "render/camera.h"
 
 #include <math.h>
@@ -9,8 +10,6 @@
 #include <stdint.h>
 #include <string.h>
 #include <cmocka.h>
-
-static const double pi = 3.14159265358979323846;
 
 static GfxPose pose_at(double x, double y, double z, double heading) {
     /* A turn by -heading about y takes +x to (cos, 0, sin). */

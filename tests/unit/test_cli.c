@@ -21,24 +21,12 @@
 #include <unistd.h>
 #include <cmocka.h>
 
+#include "scratch.h"
+
 #define COUNT(table) ((int)(sizeof(table) / sizeof *(table)))
 #define SMALL        SKIFF_SOURCE_DIR "/assets/scenes/small.json"
 
 enum { MAX_ARGUMENTS = 24, PATH_SIZE = 512 };
-
-static char folder[] = "/tmp/skiff-test-cli-XXXXXX";
-
-static int make_folder(void **state) {
-    (void)state;
-    return mkdtemp(folder) && chdir(folder) == 0 ? 0 : -1;
-}
-
-static int remove_folder(void **state) {
-    (void)state;
-    char command[128];
-    snprintf(command, sizeof command, "rm -rf '%s'", folder);
-    return chdir("/") == 0 ? system(command) : -1;
-}
 
 /* ---- Running the program ---- */
 
@@ -46,21 +34,6 @@ typedef struct Result {
     int code; /* exit code, or -signal */
     char *out, *err;
 } Result;
-
-static char *read_text(const char *path) {
-    char *text;
-    size_t size;
-    Err err = {0};
-    if (!file_read(path, 1 << 26, &text, &size, &err))
-        fail_msg("%s", err.message);
-    return text;
-}
-
-static void write_text(const char *path, const char *text) {
-    Err err = {0};
-    if (!file_write(path, text, strlen(text), &err))
-        fail_msg("%s", err.message);
-}
 
 /* Arguments separated by blanks; none holds one. */
 static pid_t start(const char *arguments) {
@@ -88,8 +61,8 @@ static Result finish(pid_t child) {
     while (waitpid(child, &status, 0) < 0)
         assert_int_equal(errno, EINTR);
     return (Result){.code = WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status),
-                    .out = read_text("stdout.txt"),
-                    .err = read_text("stderr.txt")};
+                    .out = scratch_read("stdout.txt"),
+                    .err = scratch_read("stderr.txt")};
 }
 
 static void drop(Result *result) {
@@ -145,11 +118,11 @@ static void usage_mistakes_exit_with_2(void **state) {
         {"run a.json --force=yes", "skiff run: --force takes no value\n"},
         {"run a.json -o", "skiff run: --output: DIR is missing\n"},
         {"run a.json -o out --threads 0",
-         "skiff run: --threads: expected an integer from 1 to 1024, found \"0\"\n"},
+         "skiff run: --threads: expected an integer from 1 to 256, found \"0\"\n"},
         {"run a.json -o out --threads 2.5",
-         "skiff run: --threads: expected an integer from 1 to 1024, found \"2.5\"\n"},
+         "skiff run: --threads: expected an integer from 1 to 256, found \"2.5\"\n"},
         {"run a.json -o out --threads many",
-         "skiff run: --threads: expected an integer from 1 to 1024, found \"many\"\n"},
+         "skiff run: --threads: expected an integer from 1 to 256, found \"many\"\n"},
         {"run a.json -o out --duration nan",
          "skiff run: --duration: expected a number from 1e-06 to 1e+06, found \"nan\"\n"},
         {"run a.json -o out --duration -1",
@@ -231,7 +204,7 @@ static void bad_scenes_exit_with_3(void **state) {
     (void)state;
     expect("check nowhere.json", ERR_INPUT, NULL, "nowhere.json: ");
     expect("check /tmp", ERR_INPUT, NULL, "/tmp: is a directory");
-    write_text("cut.json", "{\"version\": 1,\n \"Tank\": {");
+    scratch_write("cut.json", "{\"version\": 1,\n \"Tank\": {");
     expect("check cut.json", ERR_INPUT, NULL, "cut.json:2:");
     expect("run cut.json -o cut", ERR_INPUT, NULL, "not valid JSON");
     expect("bench cut.json", ERR_INPUT, NULL, "cut.json:2:");
@@ -250,7 +223,7 @@ static void the_engine_reports_with_file_and_path(void **state) {
         text, sizeof text,
         "%s \"RigidBodies\": [{\"name\": \"a\", \"geometryFile\": \"missing.obj\", \"isDynamic\": true}]}",
         heads[0]);
-    write_text("mesh.json", text);
+    scratch_write("mesh.json", text);
     expect("check mesh.json", ERR_INPUT, NULL, "mesh.json: RigidBodies[0]");
     expect("run mesh.json -o mesh", ERR_INPUT, NULL, "missing.obj");
     assert_false(exists("mesh"));
@@ -258,14 +231,14 @@ static void the_engine_reports_with_file_and_path(void **state) {
              "%s \"RigidBodies\": [{\"name\": \"a\", \"sphere\": 0.2}, {\"name\": \"a\", \"sphere\": 0.2,"
              " \"translation\": [3, 0, 0]}]}",
              heads[0]);
-    write_text("twins.json", text);
+    scratch_write("twins.json", text);
     expect("check twins.json", ERR_INPUT, NULL, "twins.json: RigidBodies[1]");
 }
 
 static void a_scene_without_fluid_is_said_to_have_none(void **state) {
     (void)state;
-    write_text("dry.json",
-               "{\"version\": 1, \"Tank\": {\"type\": \"box\", \"min\": [0, 0, 0], \"max\": [1, 1, 1]}}");
+    scratch_write("dry.json",
+                  "{\"version\": 1, \"Tank\": {\"type\": \"box\", \"min\": [0, 0, 0], \"max\": [1, 1, 1]}}");
     Result result = finish(start("check dry.json"));
     assert_non_null(strstr(result.err, "particles         0: the scene has no fluid\n"));
     drop(&result);
@@ -279,7 +252,7 @@ static void check_prints_a_scene_and_writes_nothing(void **state) {
     assert_non_null(strstr(first.err, "particles         800\n"));
     assert_non_null(strstr(first.err, "crate: mass 4 kg, centre (0, 0.56, 0) m"));
     assert_non_null(strstr(first.out, "\"viscosity\": 0.02"));
-    write_text("effective.json", first.out);
+    scratch_write("effective.json", first.out);
     Result second = finish(start("check effective.json"));
     assert_int_equal(second.code, 0);
     assert_string_equal(first.out, second.out);
@@ -296,7 +269,7 @@ static void check_prints_a_scene_and_writes_nothing(void **state) {
 static void the_schema_is_printed(void **state) {
     (void)state;
     Result result = finish(start("check --schema"));
-    char *shipped = read_text(SKIFF_SOURCE_DIR "/assets/schema/scene.schema.json");
+    char *shipped = scratch_read(SKIFF_SOURCE_DIR "/assets/schema/scene.schema.json");
     assert_int_equal(result.code, 0);
     assert_string_equal(result.out, shipped);
     free(shipped);
@@ -306,7 +279,7 @@ static void the_schema_is_printed(void **state) {
 /* ---- Runs ---- */
 
 static void assert_same_file(const char *a, const char *b) {
-    char *x = read_text(a), *y = read_text(b);
+    char *x = scratch_read(a), *y = scratch_read(b);
     if (strcmp(x, y) != 0)
         fail_msg("%s and %s differ", a, b);
     free(x);
@@ -365,6 +338,15 @@ static void assert_same_end(const char *a, const char *b) {
     assert_same_file(in(a, "probes.csv"), in(b, "probes.csv"));
 }
 
+static void copy(const char *from, const char *to) {
+    char *bytes;
+    size_t size;
+    Err err = {0};
+    assert_true(file_read(from, 1 << 30, &bytes, &size, &err));
+    assert_true(file_write(to, bytes, size, &err));
+    free(bytes);
+}
+
 static void a_run_writes_its_results(void **state) {
     (void)state;
     static const char *const names[] = {"steps.csv",   "ledger.csv",   "hull.csv",
@@ -380,7 +362,7 @@ static void a_run_writes_its_results(void **state) {
     assert_non_null(json_object_get(json_object_get(json_object_get(summary, "ms"), "step"), "p99"));
     assert_non_null(json_object_get(json_object_get(summary, "machine"), "cpu"));
     json_decref(summary);
-    char *report = read_text(in("done", "report.html"));
+    char *report = scratch_read(in("done", "report.html"));
     assert_non_null(strstr(report, "A small tank for tests"));
     assert_non_null(strstr(report, "</html>"));
     assert_null(strstr(report, "http")); /* nothing from elsewhere */
@@ -398,19 +380,37 @@ static void a_run_writes_its_results(void **state) {
     expect("profile nowhere", ERR_INPUT, NULL, "nowhere/steps.csv: ");
 }
 
+/* Names of files need not be UTF-8; JSON must be. */
+static void any_name_of_a_scene_will_do(void **state) {
+    (void)state;
+    copy(SMALL, "caf\xe9.json");
+    expect("run caf\xe9.json -o named -q --duration 0.003", 0, NULL, NULL);
+    json_t *summary = summary_of("named");
+    assert_string_equal(json_string_value(json_object_get(summary, "scene")), "caf?.json");
+    json_decref(summary);
+    assert_true(exists("named/report.html"));
+    assert_int_equal(mkdir("d\xe9", 0700), 0);
+    scratch_write("d\xe9/hull.obj", "");
+    scratch_write("d\xe9/a.json",
+                  "{\"version\": 1, \"RigidBodies\": [{\"name\": \"a\", \"geometryFile\": \"hull.obj\"}]}");
+    expect("check d\xe9/a.json", ERR_INPUT, NULL,
+           "RigidBodies[0].geometryFile: the name of its folder is not UTF-8 text");
+}
+
 static void an_existing_folder_is_refused(void **state) {
     (void)state;
     assert_int_equal(mkdir("kept", 0755), 0);
-    write_text("kept/state.skiff", "old");
-    write_text("kept/other.txt", "mine");
+    scratch_write("kept/state.skiff", "old");
+    scratch_write("kept/other.txt", "mine");
     expect("run " SMALL " -o kept --duration 0.01", ERR_USAGE, NULL,
            "kept: the folder exists; --resume goes on");
     assert_int_equal(entry_count("kept"), 2);
     expect("run " SMALL " -o kept --resume", ERR_INPUT, NULL, "kept/");
     expect("run " SMALL " -o kept --force --duration 0.01 --quiet", 0, NULL, NULL);
     assert_true(exists("kept/report.html") && exists("kept/other.txt"));
-    write_text("file", "");
+    scratch_write("file", "");
     expect("run " SMALL " -o file --force", ERR_USAGE, NULL, "file: exists and is not a folder");
+    expect("run " SMALL " -o file/a", ERR_IO, NULL, "file: cannot write: Not a directory");
     expect("run " SMALL " -o file/below --duration 0.01", ERR_IO, NULL, "file");
 }
 
@@ -429,15 +429,6 @@ static void probes_have_their_own_rate(void **state) {
         assert_true(late > -1e-6 && late < 0.003);
     }
     csv_free(&probes);
-}
-
-static void copy(const char *from, const char *to) {
-    char *bytes;
-    size_t size;
-    Err err = {0};
-    assert_true(file_read(from, 1 << 30, &bytes, &size, &err));
-    assert_true(file_write(to, bytes, size, &err));
-    free(bytes);
 }
 
 static void a_resumed_run_equals_a_whole_one(void **state) {
@@ -468,16 +459,16 @@ static void a_resume_that_cannot_be_right_is_refused(void **state) {
     expect("run " SMALL " -o odd -q --resume --set RigidBodies[0].density=1", ERR_INPUT, NULL,
            "at RigidBodies[0].density");
     copy("odd/steps.csv", "steps.csv");
-    write_text("odd/steps.csv", "step,t\n1,0.003\n");
+    scratch_write("odd/steps.csv", "step,t\n1,0.003\n");
     expect("run " SMALL " -o odd -q --resume", ERR_INPUT, NULL, "odd/steps.csv: has other columns");
-    char *text = read_text("steps.csv");
+    char *text = scratch_read("steps.csv");
     strchr(strchr(strchr(text, '\n') + 1, '\n') + 1, '\n')[1] = '\0'; /* header and two steps */
-    write_text("odd/steps.csv", text);
+    scratch_write("odd/steps.csv", text);
     free(text);
     expect("run " SMALL " -o odd -q --resume", ERR_INPUT, NULL,
            "odd/steps.csv: ends at step 2, before the checkpoint at step 10");
     copy("steps.csv", "odd/steps.csv");
-    write_text("odd/state.skiff", "not a state");
+    scratch_write("odd/state.skiff", "not a state");
     expect("run " SMALL " -o odd -q --resume", ERR_INPUT, NULL, "odd/state.skiff");
     unlink("odd/state.skiff");
     expect("run " SMALL " -o odd -q --resume", ERR_INPUT, NULL,
@@ -546,8 +537,8 @@ static void write_raft(const char *path, const char *drive) {
         " \"RigidBodies\": [{\"name\": \"raft\", \"box\": [0.3, 0.1, 0.2], \"density\": 500,"
         " \"translation\": [0, 0.2, 0], \"isDynamic\": true%s}]}",
         drive);
-    write_text(path, text);
-    write_text("scene.input", "0.03 throttle 0.5\n");
+    scratch_write(path, text);
+    scratch_write("scene.input", "0.03 throttle 0.5\n");
 }
 
 static const char raft_drive[] = ", \"drive\": {\"thrust\": 10, \"steeringTorque\": 0.5}";
@@ -557,9 +548,9 @@ static const char raft_input[] =
 static void a_driven_run_replays_and_resumes(void **state) {
     (void)state;
     write_raft("raft.json", raft_drive);
-    write_text("raft.input", raft_input);
+    scratch_write("raft.input", raft_input);
     expect("run raft.json -o sailed -q --input raft.input --threads 1", 0, NULL, "");
-    char *text = read_text("sailed/run.input");
+    char *text = scratch_read("sailed/run.input");
     assert_non_null(strstr(text, " heading 20\n"));
     assert_non_null(strstr(text, " rudder 1\n")); /* d is bound to it */
     free(text);
@@ -569,7 +560,7 @@ static void a_driven_run_replays_and_resumes(void **state) {
     assert_same_file("sailed/run.input", "replayed/run.input");
     /* 40 steps are 20 and 20: the folder knows its input */
     expect("run raft.json -o halves -q --input raft.input --duration 0.06", 0, NULL, "comes after the end");
-    write_text("raft.input", "");
+    scratch_write("raft.input", "");
     expect("run raft.json -o halves -q --resume", 0, NULL, "");
     static const char *const others[] = {"replayed", "halves"};
     for (int i = 0; i < COUNT(others); i++) {
@@ -584,7 +575,7 @@ static void a_driven_run_replays_and_resumes(void **state) {
     assert_same_file("sailed/run.input", "halves/run.input");
     /* the scene's own input, and a raft without one, go elsewhere */
     expect("run raft.json -o own -q", 0, NULL, "");
-    text = read_text("own/run.input");
+    text = scratch_read("own/run.input");
     assert_non_null(strstr(text, " throttle 0.5\n"));
     free(text);
 }
@@ -594,8 +585,8 @@ static void input_that_cannot_be_right_is_refused(void **state) {
     char text[256];
     write_raft("raft.json", raft_drive);
     write_raft("drift.json", "");
-    write_text("raft.input", raft_input);
-    write_text("bad.input", "1 thottle 1\n0 rudder 3\n");
+    scratch_write("raft.input", raft_input);
+    scratch_write("bad.input", "1 thottle 1\n0 rudder 3\n");
     expect("run raft.json -o never --input bad.input", ERR_INPUT, NULL,
            "bad.input:1: unknown command thottle, did you mean throttle?\n"
            "bad.input:2: 0 s is before the line above, which is at 1 s\n"
@@ -617,12 +608,17 @@ static void input_that_cannot_be_right_is_refused(void **state) {
     expect("check unfinished.json", ERR_INPUT, NULL, "none.obj");
     /* the past cannot change, the future can */
     expect("run raft.json -o past -q --input raft.input --duration 0.06", 0, NULL, "");
-    write_text("other.input", "0 press w\n0.02 heading 21\n");
+    scratch_write("other.input", "0 press w\n0.02 heading 21\n");
     expect("run raft.json -o past -q --resume --input other.input", ERR_INPUT, NULL,
            "other.input: differs from past/script.input near line 2, before the checkpoint");
-    write_text("other.input", "0 press w\n0.02 heading 20\n0.05 press d\n0.07 throttle 0\n");
+    scratch_write("other.input", "0 press w\n0.02 heading 20\n0.05 press d\n0.07 throttle 0\n");
     expect("run raft.json -o past -q --resume --input other.input", 0, NULL, "");
     assert_same_file("past/script.input", "other.input");
+    /* another scene is called that, and not one whose body lacks what the input drives */
+    expect("run drift.json -o past -q --resume", ERR_INPUT, NULL,
+           "drift.json: differs from past/scene.json at");
+    scratch_write("lost.json", "{\"version\": 1, \"input\": \"lost.input\"}");
+    expect("check lost.json", ERR_INPUT, NULL, "lost.json: input: there is no file ./lost.input\n");
 }
 
 /* ---- Benchmarks ---- */
@@ -671,19 +667,19 @@ static void bench_keeps_rows(void **state) {
     static const char arguments[] = "bench " SMALL " --settle 0 --steps 1 --windows 2 -q --results rows";
     expect(arguments, 0, "density solve", NULL);
     expect(arguments, 0, "real-time factor", NULL);
-    char *text = read_text("rows/small.csv");
+    char *text = scratch_read("rows/small.csv");
     int lines = 0;
     for (const char *c = text; *c; c++)
         lines += *c == '\n';
     assert_int_equal(lines, 3); /* a header and two rows */
     assert_ptr_equal(strstr(text, "date,commit,cpu,compiler,isa,threads,scene,"), text);
     free(text);
-    write_text("rows/small.csv", "other,columns\n");
+    scratch_write("rows/small.csv", "other,columns\n");
     expect(arguments, 0, "density solve", NULL);
-    text = read_text("rows/small.csv");
+    text = scratch_read("rows/small.csv");
     assert_string_equal(text, "other,columns\n");
     free(text);
-    text = read_text("rows/small-2.csv");
+    text = scratch_read("rows/small-2.csv");
     assert_ptr_equal(strstr(text, "date,commit,cpu,compiler,isa,threads,scene,"), text);
     free(text);
 }
@@ -699,7 +695,7 @@ static void a_full_disk_is_noticed(void **state) {
     assert_non_null(strstr(err.message, "/dev/full: writing failed: "));
     csv_close(&writer, NULL);
     assert_int_equal(system(SKIFF_PROGRAM " --help > /dev/full 2> full.txt") >> 8, ERR_IO);
-    char *text = read_text("full.txt");
+    char *text = scratch_read("full.txt");
     assert_non_null(strstr(text, "writing to stdout failed"));
     free(text);
 }
@@ -718,7 +714,7 @@ static void damaged_tables_are_refused(void **state) {
     for (int i = 0; i < COUNT(rows); i++) {
         CsvTable table;
         Err err = {0};
-        write_text("t.csv", rows[i].text);
+        scratch_write("t.csv", rows[i].text);
         assert_false(csv_read("t.csv", &table, &err));
         assert_string_equal(err.message, rows[i].message);
     }
@@ -746,8 +742,10 @@ static void rest_tiles_are_made_and_shown(void **state) {
     assert_true(figure_of("rest make --edge 6 --seed 3 --threads 1 -o a.tile --json", "points") == 271);
     double spread = figure_of("rest show a.tile --json", "density_sd_percent");
     assert_true(spread > 0 && spread < 0.01);
+    expect("rest make --edge 64 -o nowhere/a.tile", ERR_IO, NULL, /* before hours of work */
+           "nowhere/a.tile: cannot write: No such file or directory");
     expect("rest show nowhere.tile", ERR_INPUT, NULL, "nowhere.tile: ");
-    write_text("no.tile", "not a tile");
+    scratch_write("no.tile", "not a tile");
     expect("rest show no.tile", ERR_INPUT, NULL, "no.tile: not a Skiff state file");
 }
 
@@ -756,14 +754,14 @@ static void blocks_are_cut_from_runs(void **state) {
     expect("rest cut nowhere -o b.block", ERR_INPUT, NULL, "nowhere: there is no such folder");
     expect("run " SMALL " -o tank -q --duration 0.03", 0, NULL, NULL);
     expect("rest cut tank -o b.block", ERR_INPUT, NULL,
-           "nothing to cut: the box that --min and --max give reaches");
+           "m in y (--min, --max; by default 0.2 m, two support radii, inside the outermost particles)");
     expect("rest cut tank --min -0.2,0.1,-0.2 --max 0.2,0.25,0.2 -o b.block", ERR_INPUT, NULL,
            "0.15 m long in y: it must be longer than two support radii, 0.2 m");
     assert_false(exists("b.block"));
     expect("rest cut tank --min -0.2,0.05,-0.2 --max 0.2,0.35,0.2 -o b.block", 0, "block of ", NULL);
     assert_float_equal(figure_of("rest show b.block --json", "size_y"), 12, 1e-5);
     expect("rest cut tank --min -0.2,0.3,-0.2 --max 0.2,0.1,0.2 -o c.block", ERR_INPUT, NULL,
-           "tank: nothing to cut: the box that --min and --max give reaches from 0.3 to 0.1 m in y");
+           "tank: nothing to cut: the box reaches from 0.3 to 0.1 m in y");
 }
 
 int main(void) {
@@ -777,6 +775,7 @@ int main(void) {
         cmocka_unit_test(check_prints_a_scene_and_writes_nothing),
         cmocka_unit_test(the_schema_is_printed),
         cmocka_unit_test(a_run_writes_its_results),
+        cmocka_unit_test(any_name_of_a_scene_will_do),
         cmocka_unit_test(an_existing_folder_is_refused),
         cmocka_unit_test(probes_have_their_own_rate),
         cmocka_unit_test(a_resumed_run_equals_a_whole_one),
@@ -792,5 +791,5 @@ int main(void) {
         cmocka_unit_test(rest_tiles_are_made_and_shown),
         cmocka_unit_test(blocks_are_cut_from_runs),
     };
-    return cmocka_run_group_tests_name("cli", tests, make_folder, remove_folder);
+    return cmocka_run_group_tests_name("cli", tests, scratch_enter, scratch_leave);
 }

@@ -1,5 +1,6 @@
 /* Propulsion and steering: forces against their formulas on a body in empty space, what water changes, what
  * is refused, and that controls are part of the state. */
+#include "engine/base/angle.h"
 #include "engine/params.h"
 #include "engine/sim.h"
 
@@ -16,8 +17,6 @@
 #include "refuse.h"
 
 #define COUNT(table) ((int)(sizeof(table) / sizeof *(table)))
-
-static const double pi = 3.14159265358979323846;
 
 /* A box of 1 m x 0.2 m x 0.4 m and 40 kg, bow towards -x, without gravity; with or without water around. */
 typedef struct Scene {
@@ -177,7 +176,7 @@ static void rudder_turns_to_starboard(void **state) {
 
 static void a_heading_is_found_and_held(void **state) {
     (void)state;
-    const double wanted[] = {0.6, -2.5, 3.0 + 2 * 3.14159265358979323846};
+    const double wanted[] = {0.6, -2.5, 3.0 + 2 * pi};
     for (int k = 0; k < COUNT(wanted); k++) {
         Scene scene;
         scene_make(&scene);

@@ -15,26 +15,15 @@
 #include <unistd.h>
 #include <cmocka.h>
 
+#include "scratch.h"
+
 /* meshio 5.0 mixes up arrays whose place in the file happens to equal one that it has computed for another;
  * with these numbers of particles none does. */
 enum { COUNT = 30, LIVE = 29 };
 
-static char folder[] = "/tmp/skiff-test-export-XXXXXX";
 static float position[COUNT][4], velocity[COUNT][4], density[COUNT], edge[COUNT];
 static uint64_t id[COUNT];
 static double birth[COUNT];
-
-static int make_folder(void **unused) {
-    (void)unused;
-    return mkdtemp(folder) && chdir(folder) == 0 ? 0 : -1;
-}
-
-static int remove_folder(void **unused) {
-    (void)unused;
-    char command[128];
-    snprintf(command, sizeof command, "rm -rf '%s'", folder);
-    return chdir("/") == 0 ? system(command) : -1;
-}
 
 /* The last particle is a ghost, which is not exported. */
 static Frame make_frame(void) {
@@ -249,5 +238,5 @@ int main(void) {
         cmocka_unit_test(a_file_that_cannot_be_written_is_named),
         cmocka_unit_test(an_empty_frame_is_a_file_too),
     };
-    return cmocka_run_group_tests_name("export", tests, make_folder, remove_folder);
+    return cmocka_run_group_tests_name("export", tests, scratch_enter, scratch_leave);
 }

@@ -16,19 +16,7 @@
 #include <unistd.h>
 #include <cmocka.h>
 
-static char folder[] = "/tmp/skiff-test-frames-XXXXXX";
-
-static int make_folder(void **unused) {
-    (void)unused;
-    return mkdtemp(folder) && chdir(folder) == 0 ? 0 : -1;
-}
-
-static int remove_folder(void **unused) {
-    (void)unused;
-    char command[128];
-    snprintf(command, sizeof command, "rm -rf '%s'", folder);
-    return chdir("/") == 0 ? system(command) : -1;
-}
+#include "scratch.h"
 
 /* A column of water that falls freely next to a box that turns, far from the origin of the world. */
 static SkiffSim *falling(Err *err) {
@@ -392,5 +380,5 @@ int main(void) {
         cmocka_unit_test(foam_where_water_tears),
         cmocka_unit_test(foam_of_scattered_water),
     };
-    return cmocka_run_group_tests_name("frames", tests, make_folder, remove_folder);
+    return cmocka_run_group_tests_name("frames", tests, scratch_enter, scratch_leave);
 }

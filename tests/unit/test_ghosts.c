@@ -14,20 +14,9 @@
 
 #include <cmocka.h>
 
+#include "scratch.h"
+
 enum { COUNT = 5 };
-
-static char folder[] = "/tmp/skiff-test-ghosts-XXXXXX";
-
-static int make_folder(void **unused) {
-    (void)unused;
-    return mkdtemp(folder) && chdir(folder) == 0 ? 0 : -1;
-}
-
-static int remove_folder(void **unused) {
-    (void)unused;
-    remove("ghosts.skiff");
-    return chdir("/") == 0 ? rmdir(folder) : -1;
-}
 
 /* One every tenth of a second from `start` on. */
 static void fill(Ghosts *ghosts, double start) {
@@ -130,5 +119,5 @@ int main(void) {
         cmocka_unit_test(a_file_brings_them_back),
         cmocka_unit_test(nonsense_is_refused),
     };
-    return cmocka_run_group_tests_name("ghosts", tests, make_folder, remove_folder);
+    return cmocka_run_group_tests_name("ghosts", tests, scratch_enter, scratch_leave);
 }

@@ -1,6 +1,8 @@
 /* Meshes: OBJ input with good, bad and random text; closedness; transformation; mass against closed forms;
  * signed distance against brute force, with the sign from the winding number. */
+#include "base/angle.h"
 #include "base/file.h"
+#include "base/random.h"
 #include "mesh.h"
 
 #include <math.h>
@@ -26,16 +28,9 @@ static const char l_text[] = "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2
                              "f 4 3 2 1\nf 4 1 6 5\nf 10 7 8 9\nf 10 11 12 7\n"
                              "f 1 2 8 7\nf 2 3 9 8\nf 3 4 10 9\nf 4 5 11 10\nf 5 6 12 11\nf 6 1 7 12\n";
 
-static uint64_t hash_counter(uint64_t counter) {
-    uint64_t z = counter * 0x9e3779b97f4a7c15u;
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return z ^ (z >> 31);
-}
-
 /* In [-1, 1). */
 static double random_signed(uint64_t *counter) {
-    return (double)(hash_counter(++*counter) >> 11) * 0x1p-52 - 1.0;
+    return (double)(random_bits(0, (*counter)++) >> 11) * 0x1p-52 - 1.0;
 }
 
 /* Parses a copy of exactly this size, so that the sanitizer sees a read past its end. */
@@ -205,13 +200,13 @@ static void test_obj_fuzz(void **state) {
         char text[sizeof seed];
         size_t size = sizeof seed - 1;
         memcpy(text, seed, size);
-        int changes = (int)(hash_counter(++counter) % 6);
+        int changes = (int)(random_bits(0, counter++) % 6);
         for (int i = 0; i < changes; i++) {
-            size_t at = hash_counter(++counter) % size;
-            text[at] = bytes[hash_counter(++counter) % (sizeof bytes - 1)];
+            size_t at = random_bits(0, counter++) % size;
+            text[at] = bytes[random_bits(0, counter++) % (sizeof bytes - 1)];
         }
-        if (hash_counter(++counter) % 4 == 0)
-            size = hash_counter(++counter) % size;
+        if (random_bits(0, counter++) % 4 == 0)
+            size = random_bits(0, counter++) % size;
         Mesh mesh;
         Err err = {0};
         if (!parse(text, size, &mesh, &err)) {
@@ -422,7 +417,7 @@ static void test_mass(void **state) {
         for (int level = 2; level < 6; level++) {
             assert_true(mesh_make_sphere(shifts[0], 1.0f, level, &mesh, &err));
             mesh_mass(&mesh, &mass);
-            double error = 4.0 / 3.0 * 3.14159265358979 - mass.volume;
+            double error = 4.0 / 3.0 * pi - mass.volume;
             assert_true(error > 0.0 && (level == 2 || fabs(error / last - 0.25) < 0.01));
             assert_true(fabs(mass.inertia[0][0] / mass.volume - 0.4) < 1.1 * error);
             last = error;
@@ -489,7 +484,7 @@ static double winding_number(const Mesh *mesh, const double p[3]) {
         }
         sum += 2.0 * atan2(determinant, scale);
     }
-    return sum / (4.0 * 3.14159265358979);
+    return sum / (4.0 * pi);
 }
 
 static void check_distances(Mesh *mesh, uint32_t count) {

@@ -21,21 +21,9 @@
 #include <unistd.h>
 #include <cmocka.h>
 
+#include "scratch.h"
+
 enum { WIDTH = 64, HEIGHT = 48, SIZE = WIDTH * HEIGHT * 3 };
-
-static char folder[] = "/tmp/skiff-test-output-XXXXXX";
-
-static int make_folder(void **unused) {
-    (void)unused;
-    return mkdtemp(folder) && chdir(folder) == 0 ? 0 : -1;
-}
-
-static int remove_folder(void **unused) {
-    (void)unused;
-    char command[128];
-    snprintf(command, sizeof command, "rm -rf '%s'", folder);
-    return chdir("/") == 0 ? system(command) : -1;
-}
 
 static void paint(uint8_t rgb[SIZE], unsigned seed) {
     for (unsigned i = 0; i < SIZE; i++)
@@ -226,7 +214,7 @@ static void film_reports_what_ffmpeg_says(void **unused) {
     (void)unused;
     char *old = strdup(getenv("PATH"));
     char path[PATH_MAX];
-    snprintf(path, sizeof path, "%s/bin:%s", folder, old);
+    snprintf(path, sizeof path, "%s/bin:%s", scratch_folder, old);
     set_program("#!/bin/sh\necho first >&2\necho 'no room left' >&2\nexit 7\n");
     assert_int_equal(setenv("PATH", path, 1), 0);
     Err err = {0};
@@ -251,7 +239,7 @@ static void film_reports_what_ffmpeg_says(void **unused) {
     assert_string_equal(last.message, "late.mp4: ffmpeg failed: cannot close");
     assert_false(file_exists("late.mp4"));
 
-    snprintf(path, sizeof path, "%s/nothing", folder);
+    snprintf(path, sizeof path, "%s/nothing", scratch_folder);
     assert_int_equal(setenv("PATH", path, 1), 0);
     assert_null(gfx_video_begin("missing.mp4", WIDTH, HEIGHT, 25, &err));
     assert_int_equal(err.code, ERR_IO);
@@ -353,5 +341,5 @@ int main(void) {
         cmocka_unit_test(hud_shows_what_is_given),
         cmocka_unit_test(text_is_measured_as_drawn),
     };
-    return cmocka_run_group_tests_name("output", tests, make_folder, remove_folder);
+    return cmocka_run_group_tests_name("output", tests, scratch_enter, scratch_leave);
 }

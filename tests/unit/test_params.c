@@ -167,8 +167,18 @@ static void the_shipped_schema_is_current(void **state) {
     free(text);
 }
 
+static void instruction_sets_have_their_words(void **state) {
+    (void)state;
+    char list[128] = "";
+    for (int i = SKIFF_SIMD_AUTO; i <= SKIFF_SIMD_AVX512; i++)
+        snprintf(list + strlen(list), sizeof list - strlen(list), "%s%s", i > 0 ? "|" : "",
+                 skiff_simd_name((SkiffSimd)i));
+    assert_string_equal(list, SKIFF_SIMD_NAMES);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(instruction_sets_have_their_words),
         cmocka_unit_test(keys_are_unique),
         cmocka_unit_test(defaults_are_in_range),
         cmocka_unit_test(every_range_is_checked),

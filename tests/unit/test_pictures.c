@@ -16,37 +16,17 @@
 #include <unistd.h>
 #include <cmocka.h>
 
+#include "scratch.h"
+
 #define SMALL SKIFF_SOURCE_DIR "/assets/scenes/small.json"
 #define NO_GL "__EGL_VENDOR_LIBRARY_DIRS=/nonexistent "
-
-static char folder[] = "/tmp/skiff-test-pictures-XXXXXX";
-
-static int make_folder(void **unused) {
-    (void)unused;
-    return mkdtemp(folder) && chdir(folder) == 0 ? 0 : -1;
-}
-
-static int remove_folder(void **unused) {
-    (void)unused;
-    char command[128];
-    snprintf(command, sizeof command, "rm -rf '%s'", folder);
-    return chdir("/") == 0 ? system(command) : -1;
-}
-
-static char *read_text(const char *path) {
-    char *text = NULL;
-    size_t size = 0;
-    if (!file_read(path, 1 << 26, &text, &size, NULL))
-        fail_msg("%s cannot be read", path);
-    return text;
-}
 
 /* Runs the program with settings of the environment before it; checks exit code and what stderr contains. */
 static void expect_with(const char *environment, const char *arguments, int code, const char *message) {
     char command[2048];
     snprintf(command, sizeof command, "%s'%s' %s >out.txt 2>err.txt", environment, SKIFF_PROGRAM, arguments);
     int status = system(command);
-    char *text = read_text("err.txt");
+    char *text = scratch_read("err.txt");
     if (!WIFEXITED(status) || WEXITSTATUS(status) != code)
         fail_msg("skiff %s: status %x, expected exit code %d\n%s", arguments, (unsigned)status, code, text);
     if (!strstr(text, message))
@@ -103,6 +83,7 @@ static void words_are_the_renderers(void **unused) {
         snprintf(list + strlen(list), sizeof list - strlen(list), "%s%s", i > 0 ? "|" : "",
                  gfx_look_name((GfxLook)i));
     assert_string_equal(list, RENDER_LOOKS);
+    assert_string_equal(gfx_camera_kinds, RENDER_CAMERAS);
 }
 
 static void wrong_options_are_explained(void **unused) {
@@ -236,7 +217,7 @@ static void a_resumed_run_goes_on_filming(void **unused) {
 static void a_scene_can_ask_for_pictures(void **unused) {
     (void)unused;
     need_gl();
-    char *scene = read_text(SMALL);
+    char *scene = scratch_read(SMALL);
     FILE *stream = fopen("scene.json", "w");
     char *end = scene + strlen(scene);
     while (*end != '}')
@@ -295,5 +276,5 @@ int main(void) {
         cmocka_unit_test(a_scene_can_ask_for_pictures),
         cmocka_unit_test(input_files_cut_to_cameras),
     };
-    return cmocka_run_group_tests_name("pictures", tests, make_folder, remove_folder);
+    return cmocka_run_group_tests_name("pictures", tests, scratch_enter, scratch_leave);
 }

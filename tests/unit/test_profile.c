@@ -17,25 +17,7 @@
 #include <unistd.h>
 #include <cmocka.h>
 
-static char folder[] = "/tmp/skiff-test-profile-XXXXXX";
-
-static int make_folder(void **state) {
-    (void)state;
-    return mkdtemp(folder) && chdir(folder) == 0 ? 0 : -1;
-}
-
-static int remove_folder(void **state) {
-    (void)state;
-    char command[128];
-    snprintf(command, sizeof command, "rm -rf '%s'", folder);
-    return chdir("/") == 0 ? system(command) : -1;
-}
-
-static void write_text(const char *path, const char *text) {
-    Err err = {0};
-    if (!file_write(path, text, strlen(text), &err))
-        fail_msg("%s", err.message);
-}
+#include "scratch.h"
 
 static CsvTable read_table(const char *path) {
     CsvTable table;
@@ -66,7 +48,7 @@ static CsvTable known_table(void) {
                 step == 70 ? 18 : 6, moved, sort, pressure, sort + pressure);
     }
     assert_int_equal(fclose(stream), 0);
-    write_text("known.csv", text);
+    scratch_write("known.csv", text);
     free(text);
     return read_table("known.csv");
 }
@@ -151,7 +133,7 @@ static void a_run_without_moves_has_nulls(void **state) {
     (void)state;
     char text[512];
     snprintf(text, sizeof text, "%s1,0.003,0.003,10,6,3,0,1,2,3\n2,0.006,0.003,10,6,3,0,1,2,4\n", header);
-    write_text("two.csv", text);
+    scratch_write("two.csv", text);
     CsvTable table = read_table("two.csv");
     Profile profile;
     Err err = {0};
@@ -177,7 +159,7 @@ static void bad_tables_are_refused(void **state) {
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         Err err = {0};
         Profile profile;
-        write_text("x.csv", cases[i].text);
+        scratch_write("x.csv", cases[i].text);
         CsvTable table = read_table("x.csv");
         assert_false(profile_make(&table, "x.csv", &profile, &err));
         assert_int_equal(err.code, ERR_INPUT);
@@ -240,5 +222,5 @@ int main(void) {
         cmocka_unit_test(json_has_every_key),     cmocka_unit_test(a_run_without_moves_has_nulls),
         cmocka_unit_test(bad_tables_are_refused), cmocka_unit_test(a_trace_nests),
     };
-    return cmocka_run_group_tests_name("profile", tests, make_folder, remove_folder);
+    return cmocka_run_group_tests_name("profile", tests, scratch_enter, scratch_leave);
 }

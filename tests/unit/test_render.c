@@ -182,30 +182,6 @@ static void particles_that_are_not_finite_are_named(void **state) {
     surface_free(&surface);
 }
 
-static void words_are_parsed(void **state) {
-    (void)state;
-    for (int i = 0; i < GFX_BACKEND_COUNT; i++) {
-        GfxBackend backend = GFX_BACKEND_COUNT;
-        assert_true(gfx_backend_parse(gfx_backend_name((GfxBackend)i), &backend, NULL));
-        assert_int_equal(backend, i);
-    }
-    for (int i = 0; i < GFX_LOOK_COUNT; i++) {
-        GfxLook look = GFX_LOOK_COUNT;
-        assert_true(gfx_look_parse(gfx_look_name((GfxLook)i), &look, NULL));
-        assert_int_equal(look, i);
-    }
-    Err err = {0};
-    GfxBackend backend = GFX_BACKEND_OSMESA;
-    GfxLook look;
-    assert_false(gfx_backend_parse("glx", &backend, &err));
-    assert_int_equal(err.code, ERR_USAGE);
-    assert_string_equal(err.message,
-                        "unknown way to OpenGL 'glx'; possible are: auto, egl-device, egl, osmesa");
-    assert_int_equal(backend, GFX_BACKEND_OSMESA);
-    assert_false(gfx_look_parse("", &look, &err));
-    assert_string_equal(err.message, "unknown look ''; possible are: water, particles");
-}
-
 static void bad_sizes_are_refused(void **state) {
     (void)state;
     Err err = {0};
@@ -370,7 +346,6 @@ int main(void) {
         cmocka_unit_test(fading_particles_come_last_and_far_first),
         cmocka_unit_test(the_choice_repeats_and_a_far_particle_is_no_harm),
         cmocka_unit_test(particles_that_are_not_finite_are_named),
-        cmocka_unit_test(words_are_parsed),
         cmocka_unit_test(bad_sizes_are_refused),
         cmocka_unit_test(bad_scenes_are_refused_and_do_no_harm),
         cmocka_unit_test(bad_meshes_are_refused),

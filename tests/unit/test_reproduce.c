@@ -2,6 +2,7 @@
  * them. */
 #include "app/carensac.h"
 #include "app/carried.h"
+#include "app/reproduce.h"
 #include "app/series.h"
 #include "app/svg.h"
 #include "engine/base/file.h"
@@ -18,19 +19,7 @@
 #include <unistd.h>
 #include <cmocka.h>
 
-static char folder[] = "/tmp/skiff-test-reproduce-XXXXXX";
-
-static int make_folder(void **state) {
-    (void)state;
-    return mkdtemp(folder) ? 0 : -1;
-}
-
-static int remove_folder(void **state) {
-    (void)state;
-    char command[128];
-    snprintf(command, sizeof command, "rm -rf '%s'", folder);
-    return system(command);
-}
+#include "scratch.h"
 
 /* ---- Sheets ---- */
 
@@ -125,7 +114,7 @@ static void sheets_are_written_as_csv(void **state) {
     Err err = {0};
     char path[128], *text;
     size_t size;
-    snprintf(path, sizeof path, "%s/small.csv", folder);
+    snprintf(path, sizeof path, "%s/small.csv", scratch_folder);
     assert_true(sheet_write_csv(&sheet, path, &err));
     assert_true(file_read(path, 1 << 20, &text, &size, &err));
     assert_string_equal(text, "case,column,runs,median,low,high,paper\n"
@@ -233,7 +222,7 @@ static void set_ups_have_the_paper_s_sizes(void **state) {
         CarensacSetup setup;
         Err err = {0};
         float min[3], max[3];
-        assert_true(carensac_set_up(row, CARENSAC_RADIUS, folder, &setup, &err));
+        assert_true(carensac_set_up(row, CARENSAC_RADIUS, scratch_folder, &setup, &err));
         assert_float_equal(shape_volume(&setup.def.tank.geometry, min, max), expected[row].tank, 1e-3);
         assert_float_equal(min[1], 0, 1e-6);
         assert_float_equal(max[1], expected[row].top, 1e-5);
@@ -249,7 +238,7 @@ static void the_cube_floats_half_immersed_on_an_edge(void **state) {
     (void)state;
     CarensacSetup setup;
     float min[3], max[3];
-    assert_true(carensac_set_up(CARENSAC_FLOATING_CUBE, CARENSAC_RADIUS, folder, &setup, NULL));
+    assert_true(carensac_set_up(CARENSAC_FLOATING_CUBE, CARENSAC_RADIUS, scratch_folder, &setup, NULL));
     assert_float_equal(shape_volume(&setup.body.geometry, min, max), 8, 1e-4);
     assert_float_equal(min[1], 3 - sqrt(2), 1e-4);
     assert_float_equal(max[1], 3 + sqrt(2), 1e-4);
@@ -274,6 +263,11 @@ static void the_wedge_parts_the_corridor(void **state) {
     assert_true(wedge->density == 800 && wedge->stop_time == 0.72);
     assert_float_equal(shape_volume(&scene->def.tank.geometry, min, max), 50, 1e-3);
     assert_true(scene->def.sea.has_region && scene->def.sea.region_min[2] == 4.5f);
+    /* half a metre of the end absorbs, with particles of any size */
+    char edits[REPRODUCE_LAYER_EDITS][REPRODUCE_EDIT_SIZE];
+    reproduce_keep_layer(scene, 0.05, edits);
+    assert_string_equal(edits[0], "outflowDistance=10");
+    assert_string_equal(edits[1], "inflowLayer=10");
     scene_free(scene);
 }
 
@@ -295,7 +289,7 @@ static void carried_scenes_are_the_files(void **state) {
         /* with all the meshes that it names */
         static const char *const coarse[] = {"particleRadius=0.1", "timeStepSize=0.012"};
         carried = carried_scene(names[k], coarse, 2, &err);
-        SkiffSim *sim = carried ? carried_start(carried, folder, 1, SKIFF_SIMD_AUTO, &err) : NULL;
+        SkiffSim *sim = carried ? carried_start(carried, scratch_folder, 1, SKIFF_SIMD_AUTO, &err) : NULL;
         if (!sim)
             fail_msg("%s", err.message);
         assert_true(skiff_particles(sim).count > 1000);
@@ -320,7 +314,7 @@ static void a_series_grows_and_is_written(void **state) {
         if (k % 2)
             row[1] = 0.5 * k;
     }
-    snprintf(path, sizeof path, "%s/series.csv", folder);
+    snprintf(path, sizeof path, "%s/series.csv", scratch_folder);
     assert_true(series_write(&series, path, &err));
     assert_true(csv_read(path, &table, &err));
     assert_int_equal(table.row_count, 3000);
@@ -364,5 +358,5 @@ int main(void) {
         cmocka_unit_test(a_series_grows_and_is_written),
         cmocka_unit_test(offsets_cover_a_diameter_on_both_sides),
     };
-    return cmocka_run_group_tests_name("reproduce", tests, make_folder, remove_folder);
+    return cmocka_run_group_tests_name("reproduce", tests, scratch_enter, scratch_leave);
 }

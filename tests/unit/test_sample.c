@@ -1,5 +1,7 @@
 /* Boundary samples: distances, coverage, areas and normals on many shapes; exact grids; regions; thin plates;
  * refusals. */
+#include "base/angle.h"
+#include "base/random.h"
 #include "mesh.h"
 #include "sample.h"
 
@@ -29,15 +31,8 @@ typedef struct Samples {
     uint32_t *heads, *next;
 } Samples;
 
-static uint64_t hash_counter(uint64_t counter) {
-    uint64_t z = counter * 0x9e3779b97f4a7c15u;
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return z ^ (z >> 31);
-}
-
 static double random_unit(uint64_t *counter) {
-    return (double)(hash_counter(++*counter) >> 11) * 0x1p-53;
+    return random_share(0, (*counter)++);
 }
 
 /* ---- Searching ---- */
@@ -288,7 +283,7 @@ static Mesh make_prism(int sides, double radius, double height) {
     char *text = malloc(room), *end = text;
     assert_non_null(text);
     for (int i = 0; i < sides; i++) {
-        double phi = 2.0 * 3.14159265358979 * i / sides, x = radius * cos(phi), z = radius * sin(phi);
+        double phi = 2.0 * pi * i / sides, x = radius * cos(phi), z = radius * sin(phi);
         end += sprintf(end, "v %.9g 0 %.9g\nv %.9g %.9g %.9g\n", x, z, x, height, z);
     }
     for (int i = 0; i < sides; i++) {
@@ -682,18 +677,18 @@ static void test_rubbish(void **state) {
     uint64_t counter = 77;
     for (int run = 0; run < 300; run++) {
         char text[4096], *end = text;
-        int vertices = 4 + (int)(hash_counter(++counter) % 12),
-            faces = 1 + (int)(hash_counter(++counter) % 30);
+        int vertices = 4 + (int)(random_bits(0, counter++) % 12),
+            faces = 1 + (int)(random_bits(0, counter++) % 30);
         for (int i = 0; i < vertices; i++) {
             end += sprintf(end, "v");
             for (int k = 0; k < 3; k++) /* coarse numbers: many coplanar, collinear and coinciding */
-                end += sprintf(end, " %g", (double)(hash_counter(++counter) % 5) * 0.2);
+                end += sprintf(end, " %g", (double)(random_bits(0, counter++) % 5) * 0.2);
             end += sprintf(end, "\n");
         }
         for (int i = 0; i < faces; i++) {
-            int a = (int)(hash_counter(++counter) % (uint64_t)vertices), b = (a + 1) % vertices,
+            int a = (int)(random_bits(0, counter++) % (uint64_t)vertices), b = (a + 1) % vertices,
                 c = (a + 2) % vertices;
-            if (hash_counter(++counter) % 2)
+            if (random_bits(0, counter++) % 2)
                 c = (a + 3) % vertices;
             end += sprintf(end, "f %d %d %d\n", a + 1, b + 1, c + 1);
         }

@@ -198,6 +198,10 @@ static const struct {
      "[{\"name\": \"mast\", \"type\": \"bow\"}]}",
      "s.json: Keys[0].camera: there is no camera mats, did you mean mast?; there are "
      "mast|chase|fixed|orbit|top|bow"},
+    {"\"Keys\": [{\"key\": \"c\", \"action\": \"camera\", \"camera\": \"mast\"}], \"Render\": {\"cameras\": "
+     "[{\"name\": \"top\", \"type\": \"bow\"}]}",
+     "s.json: Keys[0].camera: there is no camera mast; there are "
+     "top|chase|fixed|orbit|bow"},
     {"\"Keys\": [{\"key\": \"w\", \"action\": \"throttle\"}, {\"key\": \"w\", \"action\": \"rudder\"}]",
      "s.json: Keys[1]: key w is bound by Keys[0] already"},
 
@@ -347,7 +351,7 @@ static void bodies_and_probes_reach_the_def(void **state) {
     assert_true(bodies[1].geometry.radius == 0.5f && bodies[1].mass == 4);
     assert_int_equal(bodies[1].free_axes, SKIFF_FREE_Y | SKIFF_FREE_RX);
     assert_int_equal(bodies[2].geometry.kind, SKIFF_GEOMETRY_MESH);
-    assert_string_equal(bodies[2].geometry.file, "folder//hull.obj"); /* relative to the scene */
+    assert_string_equal(bodies[2].geometry.file, "folder/hull.obj"); /* relative to the scene */
     assert_vec3(bodies[2].geometry.scale, 2, 2, 2);
     assert_vec3(bodies[2].geometry.translation, 1, 2, 3);
     assert_vec3(bodies[2].geometry.rotation_axis, 0, 0, 1);

@@ -12,7 +12,9 @@
 #include <string.h>
 #include <cmocka.h>
 
+#include "engine/base/angle.h"
 #include "engine/base/file.h"
+#include "engine/base/random.h"
 
 #define COUNT(table) ((int)(sizeof(table) / sizeof *(table)))
 
@@ -215,7 +217,7 @@ static void the_last_to_steer_wins(void **state) {
     const SkiffControls controls = helm_controls(&position);
     assert_float_equal(controls.rudder, -0.5, 0.0);
     position = at(text, 4);
-    assert_float_equal(helm_controls(&position).heading, 40.0 / 180 * 3.14159265358979323846, 1e-15);
+    assert_float_equal(helm_controls(&position).heading, 40.0 / 180 * pi, 1e-15);
 }
 
 static void scenes_bind_other_keys(void **state) {
@@ -238,9 +240,7 @@ static void scenes_bind_other_keys(void **state) {
 
 /* Counter-based, so that a failing case can be found again. */
 static uint32_t mix(uint64_t n) {
-    n = (n ^ (n >> 30)) * 0xbf58476d1ce4e5b9u;
-    n = (n ^ (n >> 27)) * 0x94d049bb133111ebu;
-    return (uint32_t)(n >> 32);
+    return (uint32_t)(random_bits(0, n) >> 32);
 }
 
 /* A random but valid file: all commands, many at the same time. */

@@ -1,6 +1,7 @@
 /* Every shape in `cases` goes through the same conformance tests: sign against the parity of a ray through
  * the tessellation, distance against the mesh and against a dense cloud of surface points, gradient, bounds,
  * volume, batches. Then: side walls, refusals, shapes as tanks and bodies, and the meshes of assets/. */
+#include "base/random.h"
 #include "shape.h"
 
 #include <math.h>
@@ -99,15 +100,8 @@ static Shape make(const SkiffGeometryDef *def, const double origin[3]) {
 
 /* ---- Random numbers by counter ---- */
 
-static uint64_t hash_counter(uint64_t counter) {
-    uint64_t z = counter * 0x9e3779b97f4a7c15u;
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return z ^ (z >> 31);
-}
-
 static double random_unit(uint64_t *counter) {
-    return (double)(hash_counter(++*counter) >> 11) * 0x1p-53;
+    return random_share(0, (*counter)++);
 }
 
 /* In the bounds of the shape, widened by `margin` of their size each way. */

@@ -123,6 +123,31 @@ static void test_blow_up(void **state) {
     skiff_destroy(sim);
 }
 
+/* Pushes of a step add up, act in that step alone, and move nothing along an axis that is held. */
+static void test_push(void **state) {
+    (void)state;
+    Scene scene;
+    Err err = {0};
+    scene_make(&scene);
+    scene.def.body_count = 1;
+    scene.def.params.gravity[1] = 0.0f;
+    scene.bodies[0].geometry.translation[1] = 0.45f; /* clear of the water */
+    scene.bodies[0].free_axes = SKIFF_FREE_X | SKIFF_FREE_RY;
+    SkiffSim *sim = accept(&scene);
+    const SkiffBody before = skiff_body(sim, 0);
+    const double dt = (double)scene.def.params.time_step;
+    skiff_body_push(sim, 0, (const double[3]){3, 7, 0}, (const double[3]){0, 0.01, 0});
+    skiff_body_push(sim, 0, (const double[3]){2, 0, 0}, (const double[3]){0.02, 0.01, 0});
+    assert_true(skiff_step(sim, &err) && skiff_step(sim, &err));
+    const SkiffBody after = skiff_body(sim, 0);
+    assert_float_equal(after.velocity[0], dt * 5 / before.mass, 1e-12);
+    assert_float_equal(after.position[0] - before.position[0], 2 * dt * after.velocity[0], 1e-12);
+    assert_float_equal(after.angular_velocity[1], dt * 0.02 / before.inertia[1][1], 1e-9);
+    assert_true(after.velocity[1] == 0.0 && after.velocity[2] == 0.0);
+    assert_true(after.angular_velocity[0] == 0.0 && after.angular_velocity[2] == 0.0);
+    skiff_destroy(sim);
+}
+
 /* A leak: without a floor the water falls out of the domain, as an error or as a count. */
 static void test_escape(void **state) {
     (void)state;
@@ -464,12 +489,13 @@ static void test_drops_touching(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_refusals),       cmocka_unit_test(test_blow_up),
-        cmocka_unit_test(test_escape),         cmocka_unit_test(test_emit),
-        cmocka_unit_test(test_flat_wall),      cmocka_unit_test(test_states),
-        cmocka_unit_test(test_carving),        cmocka_unit_test(test_remove_box),
-        cmocka_unit_test(test_wall_friction),  cmocka_unit_test(test_drops_apart),
-        cmocka_unit_test(test_drops_touching), cmocka_unit_test(test_pressure),
+        cmocka_unit_test(test_refusals),    cmocka_unit_test(test_blow_up),
+        cmocka_unit_test(test_push),        cmocka_unit_test(test_escape),
+        cmocka_unit_test(test_emit),        cmocka_unit_test(test_flat_wall),
+        cmocka_unit_test(test_states),      cmocka_unit_test(test_carving),
+        cmocka_unit_test(test_remove_box),  cmocka_unit_test(test_wall_friction),
+        cmocka_unit_test(test_drops_apart), cmocka_unit_test(test_drops_touching),
+        cmocka_unit_test(test_pressure),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

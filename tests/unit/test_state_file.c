@@ -1,5 +1,6 @@
 /* The container of arrays: what goes in comes out, and any damage is found and named. */
 #include "base/file.h"
+#include "base/random.h"
 #include "base/state_file.h"
 
 #include <setjmp.h>
@@ -14,12 +15,13 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
+#include "scratch.h"
+
 enum { VERSION = 7, HEADER_SIZE = 24, ENTRY_SIZE = 80 };
 /* Where things lie in the file. */
 enum { AT_VERSION = 8, AT_COUNT = 12, AT_HASH = 16 };
 enum { IN_TYPE = 48, IN_COMPONENTS = 52, IN_ELEMENTS = 56, IN_OFFSET = 64, IN_HASH = 72 };
 
-static char folder[] = "/tmp/skiff-test-state-XXXXXX";
 static char path[128];
 
 static const float positions[5][3] = {{1, 2, 3}, {4, -5, 6}, {0.1f, -0.0f, 1e30f}, {7, 8, 9}, {1e-40f, 1, 2}};
@@ -51,17 +53,10 @@ static unsigned char *sample_bytes(size_t *size) {
 }
 
 static int setup(void **state) {
-    (void)state;
-    if (!mkdtemp(folder))
+    if (scratch_enter(state) != 0)
         return -1;
-    snprintf(path, sizeof path, "%s/sample.state", folder);
+    snprintf(path, sizeof path, "%s/sample.state", scratch_folder);
     return 0;
-}
-
-static int teardown(void **state) {
-    (void)state;
-    unlink(path);
-    return rmdir(folder);
 }
 
 static void put32(unsigned char *bytes, size_t at, uint32_t value) {
@@ -375,20 +370,17 @@ static void open_reports_files_that_are_not_there(void **state) {
     assert_null(state_file_open("/no/such/file.state", VERSION, &err));
     assert_int_equal(err.code, ERR_INPUT);
     assert_non_null(strstr(err.message, "/no/such/file.state"));
-    assert_null(state_file_open(folder, VERSION, &err));
+    assert_null(state_file_open(scratch_folder, VERSION, &err));
     assert_int_equal(err.code, ERR_INPUT);
 }
 
 /* ---- Fuzz: several mutations at once, with the checksums made right again so that they reach the deeper
  * checks ---- */
 
-static uint64_t random_state;
+static uint64_t random_stream, random_counter;
 
 static uint64_t next_random(void) {
-    uint64_t z = random_state += 0x9e3779b97f4a7c15u;
-    z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ z >> 27) * 0x94d049bb133111ebu;
-    return z ^ z >> 31;
+    return random_bits(random_stream, random_counter++);
 }
 
 /* Numbers at which sizes overflow or just fit. */
@@ -460,7 +452,8 @@ static void hostile_bytes_do_no_harm(void **state) {
     int accepted = 0;
     uint64_t sum = 0;
     for (uint64_t round = 0; round < 20000; round++) {
-        random_state = round * 0x5851f42d4c957f2du;
+        random_stream = round;
+        random_counter = 0;
         size_t length =
             next_random() % 8 == 0 ? HEADER_SIZE + next_random() % (size + 64 - HEADER_SIZE) : size;
         memset(bad, 0, size + 64);
@@ -509,5 +502,5 @@ int main(void) {
         cmocka_unit_test(open_reports_files_that_are_not_there),
         cmocka_unit_test(hostile_bytes_do_no_harm),
     };
-    return cmocka_run_group_tests_name("state file", tests, setup, teardown);
+    return cmocka_run_group_tests_name("state file", tests, setup, scratch_leave);
 }

@@ -16,23 +16,21 @@
 #include <string.h>
 #include <unistd.h>
 
-static char folder[] = "/tmp/skiff-test-tile-XXXXXX";
+#include "scratch.h"
+
 static char path[128];
 static RestTile shipped;
 
 static int setup(void **state) {
-    (void)state;
-    if (!mkdtemp(folder))
+    if (scratch_enter(state) != 0)
         return -1;
-    snprintf(path, sizeof path, "%s/tile.skiff", folder);
+    snprintf(path, sizeof path, "%s/tile.skiff", scratch_folder);
     return tile_load_default(&shipped, NULL) ? 0 : -1;
 }
 
 static int teardown(void **state) {
-    (void)state;
     tile_free(&shipped);
-    unlink(path);
-    return rmdir(folder);
+    return scratch_leave(state);
 }
 
 /* A result of tile_fill_box. */
