@@ -32,7 +32,8 @@ static bool reserve_sorted(StandingWater *water, Err *err) {
     const size_t cells = cell_grid_count(&water->set.grid), padded = water->count + (size_t)SLICE;
     if (!buffer_reserve(&water->sorted, "standing water by cell",
                         padded * (sizeof(Float4) + 3 * sizeof(float)), err) ||
-        !buffer_reserve(&water->cells, "cells of standing water", 2 * water->count * sizeof(uint32_t), err) ||
+        !buffer_reserve(&water->cells, "cells of standing water", (size_t)2 * water->count * sizeof(uint32_t),
+                        err) ||
         !buffer_reserve(&water->start, "cell starts of standing water", (cells + 1) * sizeof(uint32_t), err))
         return false;
     Float4 *points = water->sorted.data;
@@ -72,12 +73,12 @@ bool standing_sort(StandingWater *water, float cell_size, Err *err) {
     cell_grid_sort(cell, water->count, cell_grid_count(&set->grid), water->start.data, order);
     float *x = (float *)set->x, *y = (float *)set->y, *z = (float *)set->z;
     Float4 *points = (Float4 *)set->points;
-    for (uint32_t to = 0; to < water->count; to++) {
-        const float *point = water->points[order[to]];
-        x[to] = point[0];
-        y[to] = point[1];
-        z[to] = point[2];
-        memcpy(points[to], point, sizeof points[to]);
+    for (uint32_t k = 0; k < water->count; k++) {
+        const float *point = water->points[order[k]];
+        x[k] = point[0];
+        y[k] = point[1];
+        z[k] = point[2];
+        memcpy(points[k], point, sizeof points[k]);
     }
     return true;
 }
