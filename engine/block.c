@@ -67,7 +67,7 @@ static uint32_t occupied(const SkiffSim *sim, const float first[3], const double
 /* ---- Water at rest ---- */
 
 typedef struct RestBlock {
-    GridBounds bounds; /* window-local */
+    CellBounds bounds; /* window-local */
 } RestBlock;
 
 static RestPlace block_place(const void *user, const float p[3]) {

@@ -191,29 +191,26 @@ static bool in_reach(const BoundarySet *set, uint32_t s) {
 /* Sorts a set's world positions into cells of edge h. */
 static bool sort_set(BoundarySet *set, float cell_size, Err *err) {
     const uint32_t count = set->samples.count;
-    GridBounds bounds = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    CellBounds bounds = cell_bounds_empty();
     set->sorted.count = 0;
     for (uint32_t s = 0; s < count; s++) {
         if (!in_reach(set, s))
             continue;
         set->sorted.count++;
-        for (int k = 0; k < 3; k++) {
-            bounds.min[k] = fminf(bounds.min[k], set->world[s][k]);
-            bounds.max[k] = fmaxf(bounds.max[k], set->world[s][k]);
-        }
+        cell_bounds_grow(&bounds, set->world[s]);
     }
     if (set->sorted.count == 0)
         return true;
     /* two empty layers: the 27 cells around an occupied one, and around those, exist */
-    if (!grid_layout(&set->sorted.grid, &bounds, cell_size, 2))
+    if (!cell_grid_layout(&set->sorted.grid, &bounds, cell_size, 2))
         return err_set(err, ERR_DIVERGED, "the boundary samples spread over more than %d cells of %g m",
-                       GRID_MAX_CELLS, (double)cell_size);
+                       CELL_GRID_MAX_CELLS, (double)cell_size);
     const CellGrid *grid = &set->sorted.grid;
     const size_t cells = cell_grid_count(grid);
     if (!set_reserve(set, cells, err))
         return false;
     for (uint32_t s = 0; s < count; s++)
-        set->cell[s] = in_reach(set, s) ? grid_cell_of(grid, set->world[s]) : CELL_NONE;
+        set->cell[s] = in_reach(set, s) ? cell_grid_at(grid, set->world[s]) : CELL_NONE;
     /* samples come grouped by object, and a stable sort keeps them so within a cell */
     cell_grid_sort(set->cell, count, cells, set->cells.data, set->origin);
     float *x = (float *)set->sorted.x, *y = (float *)set->sorted.y, *z = (float *)set->sorted.z;
@@ -239,7 +236,7 @@ static void sample_volumes(BoundarySet *set, const Kernel *kernel) {
 #pragma omp parallel for schedule(dynamic, 256)
     for (uint32_t s = 0; s < set->samples.count; s++) {
         const float *p = set->world[s];
-        const int32_t cell = (int32_t)grid_cell_of(grid, p);
+        const int32_t cell = (int32_t)cell_grid_at(grid, p);
         double sum = 0.0;
         for (int run = 0; run < CELL_RUNS; run++) {
             const CellRun near = cell_grid_run(grid, cell, run);

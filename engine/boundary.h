@@ -22,7 +22,7 @@ typedef struct BoundarySamples {
 typedef struct BoundarySet {
     BoundarySamples samples;
     bool has_reach;
-    GridBounds reach; /* of the water, window-local: samples outside touch none and are not sorted */
+    CellBounds reach; /* of the water, window-local: samples outside touch none and are not sorted */
     SampleSet sorted; /* in the window's frame, by cell */
     uint32_t *origin; /* [sorted.count] which of `samples` a sorted one is */
     Float4 *world;    /* [count] window-local positions in the order of `samples`; [3]: volume */

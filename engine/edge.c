@@ -141,13 +141,13 @@ static void set_free(SkiffSim *sim, uint32_t count) {
 static bool sort_rim(SkiffSim *sim, EdgePlace *place, Err *err) {
     const Particles *particles = &sim->particles;
     Sea *sea = &sim->sea;
-    GridBounds bounds;
+    CellBounds bounds;
     for (int k = 0; k < 3; k++) {
         bounds.min[k] = sim->tank.min[k] - place->support;
         bounds.max[k] = sim->tank.max[k] + place->support;
     }
-    if (!grid_layout(&place->rim_cells, &bounds, place->support, 2))
-        return err_set(err, ERR_INPUT, "the window spans more than %d cells of %g m", GRID_MAX_CELLS,
+    if (!cell_grid_layout(&place->rim_cells, &bounds, place->support, 2))
+        return err_set(err, ERR_INPUT, "the window spans more than %d cells of %g m", CELL_GRID_MAX_CELLS,
                        (double)place->support);
     const CellGrid *grid = &place->rim_cells;
     const size_t cells = cell_grid_count(grid);
@@ -161,7 +161,7 @@ static bool sort_rim(SkiffSim *sim, EdgePlace *place, Err *err) {
         const float *p = particles->position[i];
         const bool near = particles->edge[i] != EDGE_NONE &&
                           distance_before(place, p) >= place->support - RIM * place->radius;
-        cell[i] = near ? grid_cell_of(grid, p) : CELL_NONE;
+        cell[i] = near ? cell_grid_at(grid, p) : CELL_NONE;
     }
     cell_grid_sort(cell, particles->count, cells, start, index);
     place->rim_cells.start = start;
@@ -173,7 +173,7 @@ static bool sort_rim(SkiffSim *sim, EdgePlace *place, Err *err) {
 static bool is_taken(const EdgePlace *place, const float p[3]) {
     const Particles *particles = &place->sim->particles;
     const CellGrid *grid = &place->rim_cells;
-    const int32_t cell = (int32_t)grid_cell_of(grid, p);
+    const int32_t cell = (int32_t)cell_grid_at(grid, p);
     for (int run = 0; run < CELL_RUNS; run++) {
         const CellRun around = cell_grid_run(grid, cell, run);
         for (uint32_t n = around.begin; n < around.end; n++) {

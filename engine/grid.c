@@ -9,7 +9,7 @@
 
 enum { MAX_PARTS = 8 };
 
-static void grid_bounds(const Particles *particles, GridBounds *bounds, int threads) {
+static void grid_bounds(const Particles *particles, CellBounds *bounds, int threads) {
     float min_x = INFINITY, min_y = INFINITY, min_z = INFINITY, max_x = -INFINITY, max_y = -INFINITY,
           max_z = -INFINITY;
 #pragma omp parallel for schedule(static) num_threads(threads) reduction(min                                 \
@@ -26,31 +26,10 @@ static void grid_bounds(const Particles *particles, GridBounds *bounds, int thre
         max_y = p[1] > max_y ? p[1] : max_y;
         max_z = p[2] > max_z ? p[2] : max_z;
     }
-    *bounds = (GridBounds){{min_x, min_y, min_z}, {max_x, max_y, max_z}};
+    *bounds = (CellBounds){{min_x, min_y, min_z}, {max_x, max_y, max_z}};
 }
 
-bool grid_layout(CellGrid *cells, const GridBounds *bounds, float cell_size, int margin) {
-    double total = 1.0;
-    cells->inv_size = 1.0f / cell_size;
-    for (int k = 0; k < 3; k++) {
-        /* origins on multiples of the cell size: a particle changes cell only when it moves, not when the
-         * bounds do */
-        double low = floor((double)bounds->min[k] / cell_size) - margin;
-        const double high = floor((double)bounds->max[k] / cell_size) + margin;
-        if (!(high - low < (double)GRID_MAX_CELLS))
-            return false;
-        cells->origin[k] = (float)(low * cell_size);
-        /* rounding may put the lowest point into the cell below, which is the margin's: one cell more then */
-        if ((bounds->min[k] - cells->origin[k]) * cells->inv_size < (float)margin)
-            cells->origin[k] = (float)(--low * cell_size);
-        /* one more for rounding between the origin and the bounds */
-        cells->size[k] = (int32_t)(high - low) + 2;
-        total *= cells->size[k];
-    }
-    return total <= GRID_MAX_CELLS;
-}
-
-static bool inside(const float *p, const GridBounds *domain) {
+static bool inside(const float *p, const CellBounds *domain) {
     for (int k = 0; k < 3; k++)
         if (!(p[k] >= domain->min[k] && p[k] <= domain->max[k]))
             return false;
@@ -58,7 +37,7 @@ static bool inside(const float *p, const GridBounds *domain) {
 }
 
 /* Clips the bounds to the domain; particles outside go to one extra cell at the end. */
-static uint32_t count_outside(const Particles *particles, const GridBounds *domain, uint32_t *first) {
+static uint32_t count_outside(const Particles *particles, const CellBounds *domain, uint32_t *first) {
     uint32_t outside = 0;
     *first = UINT32_MAX;
     for (uint32_t i = 0; i < particles->count; i++) {
@@ -99,7 +78,7 @@ static bool grid_reserve(Grid *grid, const Particles *particles, size_t cells, i
 
 /* Fills cell, member (for now with where the particles are) and the starts; `outside` particles go to the
  * cell after the last. */
-static void counting_sort(Grid *grid, const Particles *particles, const GridBounds *domain, bool check,
+static void counting_sort(Grid *grid, const Particles *particles, const CellBounds *domain, bool check,
                           int parts) {
     const CellGrid *cells = &grid->cells;
     const uint32_t slab = (uint32_t)(cells->size[1] * cells->size[2]), slabs = (uint32_t)grid_parts(grid);
@@ -116,7 +95,7 @@ static void counting_sort(Grid *grid, const Particles *particles, const GridBoun
             const uint32_t end = (uint32_t)((uint64_t)n * (part + 1) / parts);
             for (uint32_t i = (uint32_t)((uint64_t)n * part / parts); i < end; i++) {
                 const float *p = particles->position[i];
-                unsorted[i] = check && !inside(p, domain) ? cell_count : grid_cell_of(cells, p);
+                unsorted[i] = check && !inside(p, domain) ? cell_count : cell_grid_at(cells, p);
                 if (grid->apart != NULL && unsorted[i] < cell_count)
                     unsorted[i] += (unsorted[i] / slab + grid->apart[i]) * slab;
                 histogram[unsorted[i]]++;
@@ -188,12 +167,12 @@ static void copy_points(Grid *grid, const Particles *particles, int threads) {
     }
 }
 
-bool grid_sort(Grid *grid, Particles *particles, float cell_size, const GridBounds *domain, uint32_t *removed,
+bool grid_sort(Grid *grid, Particles *particles, float cell_size, const CellBounds *domain, uint32_t *removed,
                int threads, Err *err) {
-    GridBounds bounds;
+    CellBounds bounds;
     grid_bounds(particles, &bounds, threads);
     if (particles->count == 0)
-        bounds = (GridBounds){{0}, {0}};
+        bounds = (CellBounds){{0}, {0}};
     uint32_t outside = 0;
     if (!inside(bounds.min, domain) || !inside(bounds.max, domain)) {
         uint32_t first;
@@ -213,9 +192,9 @@ bool grid_sort(Grid *grid, Particles *particles, float cell_size, const GridBoun
             bounds.max[k] = fmaxf(fminf(bounds.max[k], domain->max[k]), domain->min[k]);
         }
     }
-    if (!grid_layout(&grid->cells, &bounds, cell_size, 1))
-        return err_set(err, ERR_DIVERGED, "the fluid spreads over more than %d cells of %g m", GRID_MAX_CELLS,
-                       (double)cell_size);
+    if (!cell_grid_layout(&grid->cells, &bounds, cell_size, 1))
+        return err_set(err, ERR_DIVERGED, "the fluid spreads over more than %d cells of %g m",
+                       CELL_GRID_MAX_CELLS, (double)cell_size);
     const size_t cells = (size_t)grid->cells.size[0] * (size_t)grid_parts(grid) *
                          (size_t)grid->cells.size[1] * (size_t)grid->cells.size[2];
     const int parts = threads < MAX_PARTS ? threads : MAX_PARTS;

@@ -22,38 +22,16 @@ typedef struct Grid {
         histogram_buffer;
 } Grid;
 
-typedef struct GridBounds {
-    float min[3], max[3];
-} GridBounds;
-
-enum { GRID_MAX_CELLS = 1 << 27 };
-
 /* Sorts the particles by cell and, in groups, by row size, stably; those outside `domain` are removed and
  * counted in *removed, or are an error when `removed` is NULL (ERR_DIVERGED naming the particle). Cells come
  * from the particles' own bounds, so an empty sky costs nothing. */
-bool grid_sort(Grid *grid, Particles *particles, float cell_size, const GridBounds *domain, uint32_t *removed,
+bool grid_sort(Grid *grid, Particles *particles, float cell_size, const CellBounds *domain, uint32_t *removed,
                int threads, Err *err);
 void grid_free(Grid *grid);
-
-/* Cell table over given bounds: origin and size set, one empty layer around (`margin` layers). False when it
- * would have more than GRID_MAX_CELLS. */
-bool grid_layout(CellGrid *cells, const GridBounds *bounds, float cell_size, int margin);
-
-/* m */
-static inline float grid_centre(const CellGrid *cells, int axis) {
-    return cells->origin[axis] + 0.5f * (float)cells->size[axis] / cells->inv_size;
-}
 
 /* Parts of a slab: cell (x, y, z) of part k is cell (parts x + k, y, z) of the table of starts. */
 static inline int grid_parts(const Grid *grid) {
     return grid->apart != NULL ? 2 : 1;
-}
-
-static inline uint32_t grid_cell_of(const CellGrid *cells, const float *p) {
-    int32_t c[3];
-    for (int k = 0; k < 3; k++)
-        c[k] = (int32_t)((p[k] - cells->origin[k]) * cells->inv_size);
-    return (uint32_t)cell_grid_index(cells, c[0], c[1], c[2]);
 }
 
 #endif

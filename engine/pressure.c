@@ -38,25 +38,23 @@ static void cloud_free(PressureCloud *cloud) {
 
 static bool cloud_layout(const SkiffSim *sim, PressureCloud *cloud, Err *err) {
     const Particles *particles = &sim->particles;
-    GridBounds bounds = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-    for (uint32_t i = 0; i < particles->count; i++)
-        for (int k = 0; k < 3; k++) {
-            const float x = particles->position[i][k];
-            if (!isfinite(x))
-                return err_set(err, ERR_DIVERGED, "particle %llu has no finite position",
-                               (unsigned long long)particles->id[i]);
-            bounds.min[k] = fminf(bounds.min[k], x);
-            bounds.max[k] = fmaxf(bounds.max[k], x);
-        }
-    return grid_layout(&cloud->cells, &bounds, sim->kernel.support, 1) ||
-           err_set(err, ERR_DIVERGED, "the particles spread over more than %d cells of %g m", GRID_MAX_CELLS,
-                   (double)sim->kernel.support);
+    CellBounds bounds = cell_bounds_empty();
+    for (uint32_t i = 0; i < particles->count; i++) {
+        const float *p = particles->position[i];
+        if (!isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2]))
+            return err_set(err, ERR_DIVERGED, "particle %llu has no finite position",
+                           (unsigned long long)particles->id[i]);
+        cell_bounds_grow(&bounds, p);
+    }
+    return cell_grid_layout(&cloud->cells, &bounds, sim->kernel.support, 1) ||
+           err_set(err, ERR_DIVERGED, "the particles spread over more than %d cells of %g m",
+                   CELL_GRID_MAX_CELLS, (double)sim->kernel.support);
 }
 
 static void cloud_sort(const SkiffSim *sim, const float *unknown, PressureCloud *cloud) {
     const Particles *particles = &sim->particles;
     for (uint32_t i = 0; i < particles->count; i++)
-        cloud->cell[i] = grid_cell_of(&cloud->cells, particles->position[i]);
+        cloud->cell[i] = cell_grid_at(&cloud->cells, particles->position[i]);
     cell_grid_sort(cloud->cell, particles->count, cell_grid_count(&cloud->cells), cloud->start, cloud->order);
     for (uint32_t k = 0; k < particles->count; k++) {
         const uint32_t i = cloud->order[k];
@@ -85,7 +83,7 @@ static bool cloud_make(const SkiffSim *sim, const float *unknown, PressureCloud 
 
 /* sum_j P_j W_ij, Pa/m^3. */
 static double cloud_sum(const PressureCloud *cloud, const Kernel *kernel, const float *p) {
-    const int32_t cell = (int32_t)grid_cell_of(&cloud->cells, p);
+    const int32_t cell = (int32_t)cell_grid_at(&cloud->cells, p);
     const float support_sq = kernel->support * kernel->support;
     double sum = 0.0;
     for (int run = 0; run < CELL_RUNS; run++) {

@@ -43,7 +43,7 @@ typedef struct RestFitted {
 } RestFitted;
 
 typedef struct RestRequest {
-    GridBounds bounds; /* of the water; air is taken from up to a support radius around */
+    CellBounds bounds; /* of the water; air is taken from up to a support radius around */
     float surface;     /* y of the still surface, m: gives depth and first pressure */
     /* Is p in the water, or in the space over or beside it that only lends its density? Called from several
      * threads. Not asked about walls and bodies: that is rest_fill's own business. */

@@ -127,14 +127,14 @@ static bool is_clear(const Gather *gather, size_t cell, const float p[3]) {
 static bool make_cells(Gather *gather, Err *err) {
     SkiffSim *sim = gather->sim;
     const float support = sim->kernel.support;
-    GridBounds bounds = gather->request->bounds;
+    CellBounds bounds = gather->request->bounds;
     for (int k = 0; k < 3; k++) {
         bounds.min[k] -= support;
         bounds.max[k] += support;
     }
-    if (!grid_layout(&gather->cells, &bounds, support, 2))
-        return err_set(err, ERR_INPUT, "the water to fill spans more than %d cells of %g m", GRID_MAX_CELLS,
-                       (double)support);
+    if (!cell_grid_layout(&gather->cells, &bounds, support, 2))
+        return err_set(err, ERR_INPUT, "the water to fill spans more than %d cells of %g m",
+                       CELL_GRID_MAX_CELLS, (double)support);
     gather->cell_count =
         (size_t)gather->cells.size[0] * (size_t)gather->cells.size[1] * (size_t)gather->cells.size[2];
     if (!buffer_reserve(&sim->rest.marks, "cells to fill", gather->cell_count, err) ||

@@ -67,7 +67,7 @@ typedef struct Settle {
 /* ---- Search ---- */
 
 static bool settle_sort(Settle *settle, Err *err) {
-    const GridBounds everywhere = {{-INFINITY, -INFINITY, -INFINITY}, {INFINITY, INFINITY, INFINITY}};
+    const CellBounds everywhere = {{-INFINITY, -INFINITY, -INFINITY}, {INFINITY, INFINITY, INFINITY}};
     return grid_sort(settle->grid, settle->particles, settle->sim->kernel.support, &everywhere, NULL,
                      settle->sim->threads, err);
 }

@@ -121,19 +121,19 @@ bool rows_build(Rows *rows, const RowsJob *build, Err *err) {
         if (status & SEARCH_NEEDS_WIDE)
             rows->wide = true;
         if (status == SEARCH_OK) {
-            rows->pairs = (PairData){
-                .count = job.count,
-                .kernel = *build->kernel,
-                .volume = build->volume,
-                .factor_unit = job.factor_unit,
-                .centre = {grid_centre(job.grid, 0), grid_centre(job.grid, 1), grid_centre(job.grid, 2)},
-                .wide = rows->wide,
-                .entries = job.entries,
-                .weights = job.weights,
-                .slices = job.slices,
-                .position = job.position,
-                .density = job.density,
-                .gradient_sum = (const Float4 *)job.gradient_sum};
+            rows->pairs = (PairData){.count = job.count,
+                                     .kernel = *build->kernel,
+                                     .volume = build->volume,
+                                     .factor_unit = job.factor_unit,
+                                     .centre = {cell_grid_centre(job.grid, 0), cell_grid_centre(job.grid, 1),
+                                                cell_grid_centre(job.grid, 2)},
+                                     .wide = rows->wide,
+                                     .entries = job.entries,
+                                     .weights = job.weights,
+                                     .slices = job.slices,
+                                     .position = job.position,
+                                     .density = job.density,
+                                     .gradient_sum = (const Float4 *)job.gradient_sum};
             return true;
         }
     }

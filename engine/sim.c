@@ -263,16 +263,9 @@ static bool check_overlaps(const SkiffSim *sim, const SkiffDef *def, Err *err) {
     return good;
 }
 
-static void grow_bounds(GridBounds *bounds, const float p[3]) {
-    for (int k = 0; k < 3; k++) {
-        bounds->min[k] = fminf(bounds->min[k], p[k]);
-        bounds->max[k] = fmaxf(bounds->max[k], p[k]);
-    }
-}
-
 /* Everything there is, four supports wider, ten metres higher: water that gets out of this is lost. */
 static bool choose_domain(SkiffSim *sim, const SkiffDef *def, Err *err) {
-    GridBounds *domain = &sim->domain;
+    CellBounds *domain = &sim->domain;
     if (def->has_domain) {
         bool good = true;
         for (int k = 0; k < 3; k++) {
@@ -285,10 +278,10 @@ static bool choose_domain(SkiffSim *sim, const SkiffDef *def, Err *err) {
         }
         return good;
     }
-    *domain = (GridBounds){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    *domain = cell_bounds_empty();
     if (sim->tank.kind != SKIFF_GEOMETRY_NONE) {
-        grow_bounds(domain, sim->tank.min);
-        grow_bounds(domain, sim->tank.max);
+        cell_bounds_grow(domain, sim->tank.min);
+        cell_bounds_grow(domain, sim->tank.max);
     }
     for (int b = 0; b < def->block_count; b++) {
         float low[3], high[3];
@@ -296,11 +289,11 @@ static bool choose_domain(SkiffSim *sim, const SkiffDef *def, Err *err) {
             low[k] = (float)((double)def->blocks[b].start[k] - sim->origin[k]);
             high[k] = (float)((double)def->blocks[b].end[k] - sim->origin[k]);
         }
-        grow_bounds(domain, low);
-        grow_bounds(domain, high);
+        cell_bounds_grow(domain, low);
+        cell_bounds_grow(domain, high);
     }
     if (!(domain->min[0] <= domain->max[0]))
-        *domain = (GridBounds){{-1, -1, -1}, {1, 1, 1}};
+        *domain = (CellBounds){{-1, -1, -1}, {1, 1, 1}};
     const float grow = sim->tank.kind != SKIFF_GEOMETRY_NONE ? 4.0f * sim->kernel.support : 10.0f;
     for (int k = 0; k < 3; k++) {
         domain->min[k] -= grow;

@@ -28,7 +28,7 @@ struct SkiffSim {
     Kernel kernel;
     float volume;      /* m^3, of a particle */
     double origin[3];  /* of the window, world, m */
-    GridBounds domain; /* window-local */
+    CellBounds domain; /* window-local */
     int threads;
     SkiffSimd simd;
     const Passes *passes;

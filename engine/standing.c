@@ -47,17 +47,13 @@ static bool reserve_sorted(StandingWater *water, Err *err) {
 }
 
 static bool lay_out(StandingWater *water, float cell_size, Err *err) {
-    GridBounds bounds = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    CellBounds bounds = cell_bounds_empty();
     for (uint32_t i = 0; i < water->count; i++)
-        for (int k = 0; k < 3; k++) {
-            const float x = water->points[i][k];
-            bounds.min[k] = x < bounds.min[k] ? x : bounds.min[k];
-            bounds.max[k] = x > bounds.max[k] ? x : bounds.max[k];
-        }
+        cell_bounds_grow(&bounds, water->points[i]);
     /* two empty layers: the 27 cells around an occupied one, and around those, exist */
-    return grid_layout(&water->set.grid, &bounds, cell_size, 2) ||
+    return cell_grid_layout(&water->set.grid, &bounds, cell_size, 2) ||
            err_set(err, ERR_DIVERGED, "the water around a fill spreads over more than %d cells of %g m",
-                   GRID_MAX_CELLS, (double)cell_size);
+                   CELL_GRID_MAX_CELLS, (double)cell_size);
 }
 
 bool standing_sort(StandingWater *water, float cell_size, Err *err) {
@@ -69,7 +65,7 @@ bool standing_sort(StandingWater *water, float cell_size, Err *err) {
         return false;
     uint32_t *cell = water->cells.data, *order = cell + water->count;
     for (uint32_t i = 0; i < water->count; i++)
-        cell[i] = grid_cell_of(&set->grid, water->points[i]);
+        cell[i] = cell_grid_at(&set->grid, water->points[i]);
     cell_grid_sort(cell, water->count, cell_grid_count(&set->grid), water->start.data, order);
     float *x = (float *)set->x, *y = (float *)set->y, *z = (float *)set->z;
     Float4 *points = (Float4 *)set->points;

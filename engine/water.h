@@ -23,7 +23,7 @@ enum { WATER_SETTLED = 8 };
 typedef struct WaterPlace {
     double origin[3];  /* of the coordinates, world, m */
     float surface;     /* y of the still surface in them, m */
-    GridBounds bounds; /* in them */
+    CellBounds bounds; /* in them */
     /* At most the distance of p from the part that is wanted, m; not positive: p belongs to it. */
     float (*outside)(const void *user, const float p[3]);
     const void *user;

@@ -125,7 +125,7 @@ int main(int argc, char **argv) {
     }
     Err err = {0};
     Tank tank = {.kernel = kernel_make(0.1), .volume = 1e-4f, .passes = best_passes()};
-    const GridBounds domain = {{-1, -1, -1}, {1e4f, 1e4f, 1e4f}};
+    const CellBounds domain = {{-1, -1, -1}, {1e4f, 1e4f, 1e4f}};
     if (!tank_make(&tank, edge, layers, &err) ||
         /* the second sort knows the rows of the first search, as every step knows those of the last */
         !grid_sort(&tank.grid, &tank.particles, tank.kernel.support, &domain, NULL, 1, &err) ||

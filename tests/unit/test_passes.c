@@ -48,7 +48,7 @@ static void cloud_make(Cloud *cloud, const Passes *passes, bool wide) {
         particles_append(&cloud->particles, p, v, 0.0);
         cloud->particles.pressure[i] = (float)random_unit(&seed);
     }
-    const GridBounds domain = {{-5, -5, -5}, {5, 5, 5}};
+    const CellBounds domain = {{-5, -5, -5}, {5, 5, 5}};
     cloud->rows.wide = wide;
     assert_true(grid_sort(&cloud->grid, &cloud->particles, 0.1f, &domain, NULL, 1, &err));
     const RowsJob job = {.passes = passes,
@@ -295,7 +295,7 @@ static void test_crowd(void **state) {
     Grid grid = {0};
     static Rows rows;
     const Kernel kernel = kernel_make(0.1);
-    const GridBounds domain = {{-1, -1, -1}, {1, 1, 1}};
+    const CellBounds domain = {{-1, -1, -1}, {1, 1, 1}};
     assert_true(particles_reserve(&particles, 700, &err));
     for (int i = 0; i < 700; i++)
         particles_append(&particles, (const float[3]){1e-4f * (float)i, 0, 0}, (const float[3]){0}, 0.0);
@@ -327,9 +327,9 @@ static void test_margins(void **state) {
                                         (float)(n * 0.1), (float)n * 0.025f};
                 for (size_t p = 0; p < sizeof points / sizeof points[0]; p++) {
                     const float x = points[p], far = x + 7.0f * sizes[s];
-                    const GridBounds bounds = {{x, x, x}, {far, far, far}};
+                    const CellBounds bounds = {{x, x, x}, {far, far, far}};
                     CellGrid cells;
-                    assert_true(grid_layout(&cells, &bounds, sizes[s], margin));
+                    assert_true(cell_grid_layout(&cells, &bounds, sizes[s], margin));
                     const int low = (int)floorf((x - cells.origin[0]) * cells.inv_size);
                     const int high = (int)floorf((far - cells.origin[0]) * cells.inv_size);
                     assert_true(low >= margin && high < cells.size[0] - margin);
@@ -357,7 +357,7 @@ static void search_beside(const Passes *passes, Cloud *cloud, StandingWater *wat
     particles_append(&cloud->particles, position[0], (const float[3]){0}, 0.0);
     cloud_free(&whole);
     assert_true(standing_sort(water, 0.1f, &err));
-    const GridBounds domain = {{-5, -5, -5}, {5, 5, 5}};
+    const CellBounds domain = {{-5, -5, -5}, {5, 5, 5}};
     assert_true(grid_sort(&cloud->grid, &cloud->particles, 0.1f, &domain, NULL, 1, &err));
     const RowsJob job = {.passes = passes,
                          .grid = &cloud->grid,
@@ -435,7 +435,7 @@ static void test_sort(void **state) {
             particles.row_size[i] =
                 row_size_of((uint32_t)(30 + 8 * random_unit(&seed)), (uint32_t)(10 + 4 * random_unit(&seed)));
         }
-        const GridBounds domain = {{0, 0, 0}, {1, 0.9f, 1}};
+        const CellBounds domain = {{0, 0, 0}, {1, 0.9f, 1}};
         uint32_t removed = 0;
         assert_false(grid_sort(&grid, &particles, 0.1f, &domain, NULL, threads, &err));
         assert_int_equal(err.code, ERR_DIVERGED);
@@ -445,7 +445,7 @@ static void test_sort(void **state) {
         for (uint32_t k = 0; k < particles.count; k++) { /* in the order of cells, group by group */
             const uint32_t i = grid.member[k];
             assert_int_equal(i / ROW_GROUP, k / ROW_GROUP);
-            assert_int_equal(grid.cell[k], grid_cell_of(&grid.cells, particles.position[i]));
+            assert_int_equal(grid.cell[k], cell_grid_at(&grid.cells, particles.position[i]));
             assert_true(grid.x[k] == particles.position[i][0] && grid.y[k] == particles.position[i][1] &&
                         grid.z[k] == particles.position[i][2]);
             if (k > 0) {
