@@ -2,8 +2,8 @@
  * Fluids 100:347).
  *
  * Block 49 x 24 x 48 mm of density 800.52 in a tank of 150 x 140 mm with 52 mm of water (with the block in
- * it), r 1.25 mm, dt 0.8 ms, volumeFactor 1 (a lattice at rest density needs little settling at this
- * size). Held for 0.3 s, then free.
+ * it), r 1.25 mm (or --radius) and dt 0.8 ms (as r), volumeFactor 1 (a lattice at rest density needs little
+ * settling at this size). Held for 0.3 s, then free.
  *
  * Expected: data/04_wu2014_floating_box_rise.csv. The instant of release is not sharp there (0.05 to 0.1
  * s), and a block that lies on the floor cannot rise here, as no particle fits under it; with one layer of

@@ -1,5 +1,6 @@
 /* The pair passes against sums taken in double precision over all pairs, against each other across
  * instruction sets, and the operator identities the solvers rely on. */
+#include "engine/base/random.h"
 #include "engine/rows.h"
 #include "engine/standing.h"
 
@@ -24,9 +25,23 @@ typedef struct Cloud {
     Float4 operand[COUNT + BLOCK];
 } Cloud;
 
-static double random_unit(uint64_t *state) {
-    *state = *state * 6364136223846793005u + 1442695040888963407u;
-    return (double)(*state >> 11) / 9007199254740992.0;
+/* The next number of a stream of its own, [0, 1). */
+static double random_unit(uint64_t *drawn) {
+    return random_share(7, (*drawn)++);
+}
+
+static void cloud_search(Cloud *cloud, const Passes *passes, const StandingSet *standing) {
+    Err err = {0};
+    const CellBounds domain = {{-5, -5, -5}, {5, 5, 5}};
+    assert_true(grid_sort(&cloud->grid, &cloud->particles, 0.1f, &domain, NULL, 1, &err));
+    const RowsJob job = {.passes = passes,
+                         .grid = &cloud->grid,
+                         .particles = &cloud->particles,
+                         .kernel = &cloud->kernel,
+                         .volume = cloud->volume,
+                         .standing = standing,
+                         .threads = 1};
+    assert_true(rows_build(&cloud->rows, &job, &err));
 }
 
 /* Jittered lattice of 0.05 m, so that densities are near rest and no two points coincide; one far outlier
@@ -35,29 +50,21 @@ static void cloud_make(Cloud *cloud, const Passes *passes, bool wide) {
     Err err = {0};
     *cloud = (Cloud){.kernel = kernel_make(0.1), .volume = 0.8f * 0.05f * 0.05f * 0.05f};
     assert_true(particles_reserve(&cloud->particles, COUNT, &err));
-    uint64_t seed = 7;
+    uint64_t drawn = 0;
     for (int i = 0; i < COUNT; i++) {
         float p[3], v[3];
         const int at[3] = {i % 15, i / 15 % 10, i / 150};
         for (int k = 0; k < 3; k++) {
-            p[k] = (float)(0.047 * at[k] + 0.03 * random_unit(&seed));
-            v[k] = (float)(random_unit(&seed) - 0.5);
+            p[k] = (float)(0.047 * at[k] + 0.03 * random_unit(&drawn));
+            v[k] = (float)(random_unit(&drawn) - 0.5);
         }
         if (i == COUNT - 1)
             p[1] = 2.0f;
         particles_append(&cloud->particles, p, v, 0.0);
-        cloud->particles.pressure[i] = (float)random_unit(&seed);
+        cloud->particles.pressure[i] = (float)random_unit(&drawn);
     }
-    const CellBounds domain = {{-5, -5, -5}, {5, 5, 5}};
     cloud->rows.wide = wide;
-    assert_true(grid_sort(&cloud->grid, &cloud->particles, 0.1f, &domain, NULL, 1, &err));
-    const RowsJob job = {.passes = passes,
-                         .grid = &cloud->grid,
-                         .particles = &cloud->particles,
-                         .kernel = &cloud->kernel,
-                         .volume = cloud->volume,
-                         .threads = 1};
-    assert_true(rows_build(&cloud->rows, &job, &err));
+    cloud_search(cloud, passes, NULL);
     assert_int_equal(cloud->rows.wide, wide);
     /* what the boundary pass does when there is no boundary */
     Float4 *sum = cloud->rows.gradient_sum.data;
@@ -357,16 +364,7 @@ static void search_beside(const Passes *passes, Cloud *cloud, StandingWater *wat
     particles_append(&cloud->particles, position[0], (const float[3]){0}, 0.0);
     cloud_free(&whole);
     assert_true(standing_sort(water, 0.1f, &err));
-    const CellBounds domain = {{-5, -5, -5}, {5, 5, 5}};
-    assert_true(grid_sort(&cloud->grid, &cloud->particles, 0.1f, &domain, NULL, 1, &err));
-    const RowsJob job = {.passes = passes,
-                         .grid = &cloud->grid,
-                         .particles = &cloud->particles,
-                         .kernel = &cloud->kernel,
-                         .volume = cloud->volume,
-                         .standing = &water->set,
-                         .threads = 1};
-    assert_true(rows_build(&cloud->rows, &job, &err));
+    cloud_search(cloud, passes, &water->set);
 }
 
 static void test_standing_water(void **state) {
@@ -425,15 +423,15 @@ static void test_sort(void **state) {
         Err err = {0};
         Particles particles = {0};
         Grid grid = {0};
-        uint64_t seed = 3;
+        uint64_t drawn = 0;
         assert_true(particles_reserve(&particles, 5000, &err));
         for (int i = 0; i < 5000; i++) {
             float p[3];
             for (int k = 0; k < 3; k++)
-                p[k] = (float)random_unit(&seed);
+                p[k] = (float)random_unit(&drawn);
             particles_append(&particles, p, (const float[3]){0}, 0.0);
-            particles.row_size[i] =
-                row_size_of((uint32_t)(30 + 8 * random_unit(&seed)), (uint32_t)(10 + 4 * random_unit(&seed)));
+            particles.row_size[i] = row_size_of((uint32_t)(30 + 8 * random_unit(&drawn)),
+                                                (uint32_t)(10 + 4 * random_unit(&drawn)));
         }
         const CellBounds domain = {{0, 0, 0}, {1, 0.9f, 1}};
         uint32_t removed = 0;

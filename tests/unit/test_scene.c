@@ -5,6 +5,7 @@
 #include "app/nearest.h"
 #include "app/scene.h"
 #include "engine/base/file.h"
+#include "engine/base/random.h"
 
 #include <dirent.h>
 #include <math.h>
@@ -563,14 +564,14 @@ static void edits_create_what_is_missing(void **state) {
 
 static void damaged_scenes_do_not_crash(void **state) {
     (void)state;
-    uint64_t random = 1;
+    uint64_t random = 0;
     size_t size = strlen(full);
     char *text = malloc(size);
     assert_non_null(text);
     for (int round = 0; round < 3000; round++) {
         memcpy(text, full, size);
         for (int change = 0; change < 1 + round % 4; change++) {
-            random = random * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+            random = random_bits(1, (uint64_t)(4 * round + change));
             const char *bytes = "{}[]\",:-0e\xff\\";
             char byte = round % 2 ? bytes[(random >> 40) % strlen(bytes)] : (char)(random >> 56);
             text[(random >> 20) % size] = byte;

@@ -2,6 +2,7 @@
  * anchored in the world, that making one does not depend on threads, and what damaged files are answered
  * with. */
 #include "base/file.h"
+#include "base/random.h"
 #include "base/state_file.h"
 #include "kernel.h"
 #include "tile.h"
@@ -418,9 +419,8 @@ static void damage_is_found(void **state) {
     assert_true(tile_save(&shipped, path, &err));
     assert_true(file_read(path, 1 << 20, &bytes, &size, &err));
     assert_true(size < 60000);
-    uint64_t random = 1;
     for (int n = 0; n < 400; n++) {
-        random = random * 6364136223846793005u + 1442695040888963407u;
+        const uint64_t random = random_bits(1, (uint64_t)n);
         const size_t at = (size_t)(random >> 33) % (n < 200 ? size : 500);
         const char mask = (char)(1 << (random >> 13 & 7));
         bytes[at] ^= mask;
