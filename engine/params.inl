@@ -46,7 +46,7 @@ PARAM_FLOAT(rest_max_constant, "restMaxConstant", 0.7f, 0.0f, 2.0f, "density0", 
 PARAM_ENUM(rest_settle, "restSettle", 2, "all|candidates|shell", "Filling: what the stabilisation moves: all new water; as the paper only the candidates near solids and existing water; or a layer twice as thick and then, for restFinalSteps, all new water (all from the first step where water exists)")
 PARAM_FLOAT(rest_time_scale, "restTimeScale", 0.0f, 0.0f, 100.0f, "dt", "Filling: time step of the stabilisation; 0: the longest that the depth allows; 1 as the paper")
 PARAM_INT(rest_steps, "restSteps", 30, 0, 1000, "", "Filling: most steps of the stabilisation; 10 in the paper")
-PARAM_INT(rest_final_steps, "restFinalSteps", 18, 0, 1000, "", "Filling: restSettle all and shell: most steps after those, of all new water; up to twice as many while a particle moves more than a tenth of its radius in one")
+PARAM_INT(rest_final_steps, "restFinalSteps", 18, 0, 1000, "", "Filling: restSettle all and shell: most steps after those, of all new water; up to twice as many while a particle moves more than a tenth of its radius in one, or a twentieth and ever faster")
 PARAM_INT(rest_min_steps, "restMinSteps", 4, 0, 1000, "", "Filling: fewest steps of the stabilisation; 4 in the authors' code, 1 in the paper")
 PARAM_ENUM(rest_schedule, "restSchedule", 0, "constant|printed", "Filling: share of the velocity kept a step is restRetention; or 1 - alpha with alpha falling from 0.8 to 0.1, as printed")
 PARAM_FLOAT(rest_retention, "restRetention", 0.85f, 0.0f, 1.0f, "", "Filling: share of the velocity kept in a step of the stabilisation; 0.8 in the authors' code")

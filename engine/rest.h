@@ -67,6 +67,7 @@ typedef struct RestCloud {
     bool fits_walls;     /* the points fit the walls: these make no candidates and remove nothing */
     float counted_below; /* y: candidates above lack neighbours and do not count in the mean density */
     Buffer marks, clearance, laid, source, fate, tallies; /* rest_gather.c */
+    Buffer speeds;       /* [particles of the simulation] m/s, before a step */
     Buffer frozen, held; /* [points] 1: gets no row; [particles of the simulation] 1: does not move */
     Buffer state, constant, walls, sum, density, order; /* rest_select.c */
     Buffer kept[PARTICLE_FIELD_COUNT + 1];              /* existing water as it was, and its densities */

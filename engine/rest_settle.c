@@ -34,8 +34,10 @@ static const float HELD_SHARE = 0.15f;
 /* Of what two particles lack to the distance of a radius, the share that each moves a step. */
 static const float PART_SHARE = 0.1f;
 
-/* Motion in one step, r, of a particle that is not yet where it will stay. */
-static const float FAST_MOTION = 0.1f;
+/* Motion in one step, r, of a particle that is not yet where it will stay; and of one that leaves the top
+ * between two layers, where it balanced: its speed grows by a tenth a step and more, in spite of the damping.
+ */
+static const float FAST_MOTION = 0.1f, LEAVING_MOTION = 0.05f, LEAVING_GROWTH = 1.1f;
 
 /* Share of a density error that a step corrects, and of the velocity that it keeps, while a column settles.
  */
@@ -56,7 +58,7 @@ typedef struct Settle {
     const uint8_t *held;     /* [particles] 1: does not move; or NULL */
     uint32_t active;
     int steps;     /* at most */
-    int patience;  /* further ones, while a particle moves more than FAST_MOTION */
+    int patience;  /* further ones, while a particle is not where it will stay; not for the cloud */
     bool layer;    /* only what is beside solids and existing water: in the cloud */
     bool yields;   /* existing water beside the new moves too */
     bool tracks;   /* where existing water was before the sorts: RestCloud.whence */
@@ -146,37 +148,58 @@ bool rest_search(SkiffSim *sim, uint32_t evaluated, Err *err) {
 
 typedef struct SpeedSums {
     double mean, max;
+    double leaving; /* largest of those whose speed grows */
 } SpeedSums;
 
-static SpeedSums block_speeds(const Settle *settle, uint32_t block) {
+static float speed_of(const Particles *particles, uint32_t i) {
+    const float *v = particles->velocity[i];
+    return sqrtf(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
+/* The speeds with which a step begins; zeros when nobody asks whose grow. */
+static void note_speeds(const Settle *settle) {
+    if (settle->patience == 0)
+        return;
+    float *before = settle->sim->rest.speeds.data;
+#pragma omp parallel for schedule(static) num_threads(settle->sim->threads)
+    for (uint32_t i = 0; i < settle->particles->count; i++)
+        before[i] = speed_of(settle->particles, i);
+}
+
+static SpeedSums block_speeds(const Settle *settle, uint32_t block, float growth) {
     const Particles *particles = settle->particles;
+    const float *before = settle->patience > 0 ? settle->sim->rest.speeds.data : NULL;
     const uint32_t end = (block + 1) * BLOCK < particles->count ? (block + 1) * BLOCK : particles->count;
     SpeedSums sums = {0};
     for (uint32_t i = block * BLOCK; i < end; i++) {
         if (settle->held != NULL && settle->held[i])
             continue;
-        const float *v = particles->velocity[i];
-        const double speed = sqrt((double)(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]));
+        const double speed = (double)speed_of(particles, i);
         sums.mean += speed;
         sums.max = speed <= sums.max ? sums.max : speed;
+        if (before != NULL && speed > (double)(growth * before[i]))
+            sums.leaving = speed <= sums.leaving ? sums.leaving : speed;
     }
     return sums;
 }
 
-static SpeedSums measure_speeds(const Settle *settle) {
+/* `growth`: of a speed since note_speeds, that counts as leaving. */
+static SpeedSums measure_speeds(const Settle *settle, float growth) {
     const uint32_t blocks = particles_blocks(settle->particles);
     double *partials = settle->dfsph->partials; /* free between the solves */
 #pragma omp parallel for schedule(static) num_threads(settle->sim->threads)
     for (uint32_t block = 0; block < blocks; block++) {
-        const SpeedSums sums = block_speeds(settle, block);
+        const SpeedSums sums = block_speeds(settle, block, growth);
         partials[(size_t)block * DFSPH_SUMS] = sums.mean;
         partials[(size_t)block * DFSPH_SUMS + 1] = sums.max;
+        partials[(size_t)block * DFSPH_SUMS + 2] = sums.leaving;
     }
     SpeedSums sums = {0};
     for (uint32_t block = 0; block < blocks; block++) {
-        const double max = partials[(size_t)block * DFSPH_SUMS + 1];
-        sums.mean += partials[(size_t)block * DFSPH_SUMS];
-        sums.max = max <= sums.max ? sums.max : max;
+        const double *part = partials + (size_t)block * DFSPH_SUMS;
+        sums.mean += part[0];
+        sums.max = part[1] <= sums.max ? sums.max : part[1];
+        sums.leaving = part[2] <= sums.leaving ? sums.leaving : part[2];
     }
     sums.mean /= settle->active;
     return sums;
@@ -411,10 +434,12 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
                                   .evaluated_count = settle->active,
                                   .threads = settle->sim->threads};
     scale_pressures(settle, scale * scale);
-    bool calm = false, fast = false;
-    for (int step = 0; step < settle->steps + (fast ? settle->patience : 0) && !calm; step++, fill->steps++) {
+    bool calm = false, restless = false;
+    for (int step = 0; step < settle->steps + (restless ? settle->patience : 0) && !calm;
+         step++, fill->steps++) {
         if (!search(settle, first_id, err))
             return false;
+        note_speeds(settle);
         forces_apply_fluid(&problem, settle->dfsph);
         if (params->rest_divergence)
             dfsph_solve(settle->dfsph, &problem, SOLVE_DIVERGENCE);
@@ -423,10 +448,12 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
         if (settle->held != NULL)
             correct_held(settle);
         dfsph_solve(settle->dfsph, &problem, SOLVE_DENSITY);
-        const SpeedSums speeds = measure_speeds(settle);
+        const float damped = step > 0 ? kept_share(params, step - 1) : 1.0f;
+        const SpeedSums speeds = measure_speeds(settle, LEAVING_GROWTH / damped);
         fill->mean_speed = speeds.mean;
         fill->max_speed = speeds.max;
-        fast = speeds.max * (double)params->time_step >= (double)(FAST_MOTION * params->particle_radius);
+        const double radii = (double)(params->time_step / params->particle_radius);
+        restless = speeds.max * radii >= (double)FAST_MOTION || speeds.leaving * radii >= (double)LEAVING_MOTION;
         calm = step + 1 >= params->rest_min_steps && speeds.max < (double)params->rest_max_speed * unit &&
                speeds.mean < (double)params->rest_mean_speed * unit;
         move_active(settle, kept_share(params, step));
@@ -541,7 +568,8 @@ static bool settle_water(SkiffSim *sim, float surface, uint64_t first_id, SkiffF
     if (fill->active == 0)
         return true;
     if (!buffer_reserve(&sim->rest.held, "held particles", sim->particles.capacity + SLICE, err) ||
-        !buffer_reserve(&sim->rest.frozen, "held particles", sim->particles.capacity + SLICE, err))
+        !buffer_reserve(&sim->rest.frozen, "held particles", sim->particles.capacity + SLICE, err) ||
+        !buffer_reserve(&sim->rest.speeds, "speeds before a step", sim->particles.capacity * sizeof(float), err))
         return false;
     const bool nothing_else = fill->active == sim->particles.count;
     memset(sim->rest.held.data, 0, sim->particles.capacity + SLICE);
@@ -659,7 +687,8 @@ void rest_cloud_free(RestCloud *cloud) {
     Buffer *buffers[] = {&cloud->tallies, &cloud->marks,    &cloud->clearance, &cloud->laid,
                          &cloud->source,  &cloud->fate,     &cloud->frozen,    &cloud->held,
                          &cloud->state,   &cloud->constant, &cloud->walls,     &cloud->sum,
-                         &cloud->density, &cloud->order,    &cloud->whence[0], &cloud->whence[1]};
+                         &cloud->density, &cloud->order,    &cloud->whence[0], &cloud->whence[1],
+                         &cloud->speeds};
     for (size_t b = 0; b < sizeof buffers / sizeof *buffers; b++)
         buffer_free(buffers[b]);
     for (int f = 0; f <= PARTICLE_FIELD_COUNT; f++)
