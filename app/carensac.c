@@ -296,8 +296,8 @@ double carensac_time_step(double radius) {
 }
 
 void carensac_set_paper_method(SkiffParams *params) {
-    params->rest_settle = 1;   /* candidates */
-    params->rest_schedule = 0; /* constant */
+    params->rest_settle = SKIFF_REST_SETTLE_CANDIDATES;
+    params->rest_schedule = SKIFF_REST_SCHEDULE_CONSTANT;
     params->rest_retention = 0.8f;
     params->rest_steps = 10;
     params->rest_min_steps = 4;

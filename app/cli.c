@@ -80,6 +80,8 @@ typedef struct Command {
     }
 #define OPTION_ROW_JSON                                                                                      \
     { 0, "json", NULL, OPTION_FLAG, AT(json), .help = "One line of JSON in place of the table" }
+#define OPTION_ROW_FORCE                                                                                     \
+    { 'f', "force", NULL, OPTION_FLAG, AT(force), .help = "Replace the results in an existing folder" }
 #define OPTION_ROW_HELP                                                                                      \
     { 'h', "help", NULL, OPTION_FLAG, AT(help), .help = "Show this help" }
 
@@ -151,7 +153,7 @@ static const Option run_options[] = {
      .help = "Simulated seconds, in place of the scene's"},
     OPTION_ROWS_ENGINE,
     OPTION_ROW_SET,
-    {'f', "force", NULL, OPTION_FLAG, AT(force), .help = "Replace the results in an existing folder"},
+    OPTION_ROW_FORCE,
     {'r', "resume", NULL, OPTION_FLAG, AT(resume), .help = "Go on from the folder's last checkpoint"},
     {0, "checkpoint-every", "S", OPTION_NUMBER, AT(checkpoint_every), .min = 0, .max = 1e9,
      .help = "Wall-clock seconds between checkpoints (default 120; 0: after every step)"},
@@ -251,6 +253,7 @@ static const Option reproduce_options[] = {
      .help = "Particle radius, m (default 0.025, as the paper): 0.05 gives a quick look at an eighth of the "
              "particles"},
     {'o', "output", "DIR", OPTION_TEXT, AT(output), .help = "Folder for report.html and the CSV files"},
+    OPTION_ROW_FORCE,
     {0, "json", NULL, OPTION_FLAG, AT(json), .help = "One line of JSON for each row in place of the tables"},
     OPTION_ROWS_ENGINE,
     {'q', "quiet", NULL, OPTION_FLAG, AT(quiet), .help = "No progress on stderr"},
@@ -260,7 +263,7 @@ static const Option reproduce_options[] = {
 static const Option render_options[] = {
     {'o', "output", "OUT", OPTION_TEXT, AT(output),
      .help = "Folder for the results (default DIR/redrawn, or DIR/export)"},
-    {'f', "force", NULL, OPTION_FLAG, AT(force), .help = "Replace the results in an existing folder"},
+    OPTION_ROW_FORCE,
     OPTION_ROWS_PICTURES,
     {0, "export", "FORMAT", OPTION_CHOICE, PICTURE(export), .names = VIEW_EXPORTS,
      .help = "Convert the particles instead of drawing them: vtk (.vtu: ParaView, Blender), ply, bgeo "

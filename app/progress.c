@@ -62,3 +62,9 @@ void progress_clear(Progress *progress) {
         fputs("\r\033[K", stderr);
     progress->is_shown = false;
 }
+
+void progress_log(LogLevel level, const char *message, void *user) {
+    if (user)
+        progress_clear(user);
+    fprintf(stderr, "skiff: %s%s\n", level == LOG_WARNING ? "warning: " : "", message);
+}

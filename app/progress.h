@@ -3,6 +3,7 @@
 #ifndef SKIFF_APP_PROGRESS_H
 #define SKIFF_APP_PROGRESS_H
 
+#include "engine/base/log.h"
 #include "engine/skiff.h"
 
 typedef struct Progress {
@@ -21,5 +22,7 @@ Progress progress_begin(double begin, double end, bool is_quiet);
 void progress_step(Progress *progress, const SkiffSim *sim);
 /* Clears the line, so that something else can be printed. */
 void progress_clear(Progress *progress);
+/* A LogSink: a line on stderr, after the progress that stands there. user: the Progress, or NULL. */
+void progress_log(LogLevel level, const char *message, void *user);
 
 #endif

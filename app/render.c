@@ -7,11 +7,11 @@
 
 #include "export.h"
 #include "interrupt.h"
+#include "progress.h"
 #include "scene.h"
 #include "view.h"
 
 #include "engine/base/file.h"
-#include "engine/base/log.h"
 
 #include <errno.h>
 #include <math.h>
@@ -134,17 +134,12 @@ static bool redraw_all(Redraw *redraw, Err *err) {
     return ok;
 }
 
-static void log_line(LogLevel level, const char *message, void *user) {
-    (void)user;
-    fprintf(stderr, "skiff: %s%s\n", level == LOG_WARNING ? "warning: " : "", message);
-}
-
 bool render_command(const CliArgs *args, Err *err) {
     Redraw redraw = {.args = args};
     if (!check_args(&redraw, err))
         return false;
     interrupt_hold();
-    log_set_sink(log_line, NULL, args->quiet ? LOG_WARNING : LOG_INFO);
+    log_set_sink(progress_log, NULL, args->quiet ? LOG_WARNING : LOG_INFO);
     bool ok = begin(&redraw, err) && redraw_all(&redraw, err);
     log_set_sink(NULL, NULL, LOG_WARNING);
     view_destroy(redraw.view);

@@ -9,8 +9,6 @@
 #include "interrupt.h"
 #include "run_folder.h"
 
-#include "engine/base/log.h"
-
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -104,11 +102,6 @@ static bool end_normally(Run *run, Err *err) {
 }
 
 /* Warnings of the engine stand on lines of their own, not in the line of progress. */
-static void log_line(LogLevel level, const char *message, void *user) {
-    progress_clear(user);
-    fprintf(stderr, "skiff: %s%s\n", level == LOG_WARNING ? "warning: " : "", message);
-}
-
 static bool make_view(Run *run, Err *err) {
     ViewOptions options;
     if (!view_options_make(&options, run->args, run->scene, err))
@@ -122,7 +115,7 @@ static bool make_view(Run *run, Err *err) {
 
 static bool run_scene(Run *run, Err *err) {
     interrupt_hold();
-    log_set_sink(log_line, &run->progress, LOG_INFO);
+    log_set_sink(progress_log, &run->progress, LOG_INFO);
     run->scene = load_scene(run->args, err);
     const char *folder = run->args->resume ? run->args->output : NULL;
     if (!run->scene || (folder && !run_check_resume(run, err)) ||

@@ -285,7 +285,7 @@ static bool lay_water(SkiffSim *sim, const EdgePlace *place, Err *err) {
     if (!touches)
         return append_laid(sim, err);
     const SkiffParams params = sim->params;
-    sim->params.rest_settle = REST_SETTLE_CANDIDATES;
+    sim->params.rest_settle = SKIFF_REST_SETTLE_CANDIDATES;
     sim->params.rest_steps = sim->params.rest_min_steps = params.window_steps;
     sim->params.rest_target = params.window_target;
     const RestRequest request = laid_request(sim, place);

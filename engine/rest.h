@@ -23,12 +23,6 @@ typedef enum RestKind {
     REST_RIM /* stands still beside what is active */
 } RestKind;
 
-/* Values of the params rest_rule, rest_protector and rest_schedule. */
-enum { REST_RULE_BASE, REST_RULE_REGULATOR, REST_RULE_PROTECTION };
-enum { REST_PROTECTOR_MARKED, REST_PROTECTOR_DENSER, REST_PROTECTOR_PRINTED };
-enum { REST_SCHEDULE_CONSTANT, REST_SCHEDULE_PRINTED };
-enum { REST_SETTLE_ALL, REST_SETTLE_CANDIDATES, REST_SETTLE_SHELL };
-
 struct SkiffSim;
 
 /* Where water shall be. All of it window-local. */

@@ -157,9 +157,9 @@ static bool shields(const Select *select, uint32_t j, uint32_t i) {
     const bool denser =
         select->density[j] > select->density[i] || (select->density[j] == select->density[i] && j < i);
     switch (select->params->rest_protector) {
-    case REST_PROTECTOR_DENSER:
+    case SKIFF_REST_PROTECTOR_DENSER:
         return denser && (marked || select->state[j] == CANDIDATE);
-    case REST_PROTECTOR_PRINTED:
+    case SKIFF_REST_PROTECTOR_PRINTED:
         return marked;
     default:
         return denser && marked;
@@ -182,9 +182,9 @@ static bool is_protected(const Select *select, uint32_t i, float limit) {
  * difference in density: two points would save each other for ever, unless marks are lifted one by one. */
 static void protect(Select *select, float limit) {
     uint8_t *stays = select->cloud->fate.data; /* not needed any more */
-    if (select->params->rest_rule != REST_RULE_PROTECTION)
+    if (select->params->rest_rule != SKIFF_REST_RULE_PROTECTION)
         return;
-    if (select->params->rest_protector == REST_PROTECTOR_PRINTED) {
+    if (select->params->rest_protector == SKIFF_REST_PROTECTOR_PRINTED) {
         for (uint32_t k = 0; k < select->candidate_count; k++) {
             const uint32_t i = select->candidates[k];
             if (select->state[i] == MARKED && is_protected(select, i, limit))
@@ -228,7 +228,7 @@ static void remove_above(Select *select, float limit) {
 
 /* Sec. 3.1.2. Densities are in units of rest density. */
 static float next_step(const SkiffParams *params, float step, double mean) {
-    if (params->rest_rule == REST_RULE_BASE || (params->rest_freeze && step <= params->rest_min_step))
+    if (params->rest_rule == SKIFF_REST_RULE_BASE || (params->rest_freeze && step <= params->rest_min_step))
         return step;
     double wanted = (mean - (double)params->rest_target) * (double)params->rest_ratio;
     if (params->rest_round) /* the authors' code counts whole kg/m^3 */
@@ -313,7 +313,7 @@ static void widen(Select *select) {
 static void keep_selected(Select *select, SkiffFill *fill) {
     Particles *points = &select->cloud->points;
     uint32_t kept = 0, *order = select->cloud->order.data;
-    if (select->params->rest_settle == REST_SETTLE_SHELL)
+    if (select->params->rest_settle == SKIFF_REST_SETTLE_SHELL)
         widen(select);
     mark_rim(select);
     fill->active = 0;

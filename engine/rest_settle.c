@@ -220,7 +220,7 @@ static void move_active(const Settle *settle, float kept) {
 }
 
 static float kept_share(const SkiffParams *params, int step) {
-    if (params->rest_schedule == REST_SCHEDULE_CONSTANT || params->rest_steps < 2)
+    if (params->rest_schedule == SKIFF_REST_SCHEDULE_CONSTANT || params->rest_steps < 2)
         return params->rest_retention;
     const double fall = pow(LAST_ALPHA / FIRST_ALPHA, (double)step / (params->rest_steps - 1));
     return (float)(1.0 - FIRST_ALPHA * fall);
@@ -412,9 +412,9 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
     SkiffParams *params = &settle->params;
     const double unit = (double)(params->particle_radius / params->time_step);
     const float scale = step_scale(settle);
-    const float errors = !settle->layer                                  ? LAST_ERRORS
-                         : params->rest_settle == REST_SETTLE_CANDIDATES ? PAPER_ERRORS
-                                                                         : LAYER_ERRORS;
+    const float errors = !settle->layer                                        ? LAST_ERRORS
+                         : params->rest_settle == SKIFF_REST_SETTLE_CANDIDATES ? PAPER_ERRORS
+                                                                               : LAYER_ERRORS;
     params->max_density_error = errors * params->rest_density_error;
     params->max_divergence_error *= errors;
     params->softening = params->rest_softening;
@@ -443,7 +443,7 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
         forces_apply_fluid(&problem, settle->dfsph);
         if (params->rest_divergence)
             dfsph_solve(settle->dfsph, &problem, SOLVE_DIVERGENCE);
-        if (params->rest_settle != REST_SETTLE_CANDIDATES)
+        if (params->rest_settle != SKIFF_REST_SETTLE_CANDIDATES)
             part_pairs(settle);
         if (settle->held != NULL)
             correct_held(settle);
@@ -453,7 +453,8 @@ static bool run_steps(Settle *settle, SettleSearch *search, uint64_t first_id, S
         fill->mean_speed = speeds.mean;
         fill->max_speed = speeds.max;
         const double radii = (double)(params->time_step / params->particle_radius);
-        restless = speeds.max * radii >= (double)FAST_MOTION || speeds.leaving * radii >= (double)LEAVING_MOTION;
+        restless =
+            speeds.max * radii >= (double)FAST_MOTION || speeds.leaving * radii >= (double)LEAVING_MOTION;
         calm = step + 1 >= params->rest_min_steps && speeds.max < (double)params->rest_max_speed * unit &&
                speeds.mean < (double)params->rest_mean_speed * unit;
         move_active(settle, kept_share(params, step));
@@ -569,7 +570,8 @@ static bool settle_water(SkiffSim *sim, float surface, uint64_t first_id, SkiffF
         return true;
     if (!buffer_reserve(&sim->rest.held, "held particles", sim->particles.capacity + SLICE, err) ||
         !buffer_reserve(&sim->rest.frozen, "held particles", sim->particles.capacity + SLICE, err) ||
-        !buffer_reserve(&sim->rest.speeds, "speeds before a step", sim->particles.capacity * sizeof(float), err))
+        !buffer_reserve(&sim->rest.speeds, "speeds before a step", sim->particles.capacity * sizeof(float),
+                        err))
         return false;
     const bool nothing_else = fill->active == sim->particles.count;
     memset(sim->rest.held.data, 0, sim->particles.capacity + SLICE);
@@ -581,7 +583,7 @@ static bool settle_water(SkiffSim *sim, float surface, uint64_t first_id, SkiffF
                 run_steps(&settle, search_all, first_id, fill, err);
     /* a particle that was held between two layers beside what is taken out falls into one of them only now */
     settle.steps = settle.patience = params->rest_final_steps;
-    settle.yields = params->rest_settle == REST_SETTLE_SHELL;
+    settle.yields = params->rest_settle == SKIFF_REST_SETTLE_SHELL;
     good = good && run_steps(&settle, search_all, first_id, fill, err);
     if (good && settle.tracks)
         restart_existing(sim, first_id);
@@ -648,7 +650,7 @@ bool rest_fill(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *
     *fill = (SkiffFill){0};
     const uint64_t first_id = sim->particles.next_id;
     const uint32_t count = sim->particles.count;
-    const bool all = sim->params.rest_settle != REST_SETTLE_CANDIDATES;
+    const bool all = sim->params.rest_settle != SKIFF_REST_SETTLE_CANDIDATES;
     const double start = timer_ms();
     if ((request->fitted == NULL && !rest_check_tile(sim, err)) ||
         (all && count > 0 && !keep_existing(sim, err)))
@@ -658,7 +660,7 @@ bool rest_fill(SkiffSim *sim, const RestRequest *request, SkiffFill *fill, Err *
     good = good && rest_select(sim, fill, err);
     const double selected = timer_ms();
     /* a layer between walls and water that both stand still finds no rest */
-    const bool layer = !all || (sim->params.rest_settle == REST_SETTLE_SHELL && count == 0);
+    const bool layer = !all || (sim->params.rest_settle == SKIFF_REST_SETTLE_SHELL && count == 0);
     good = good && (!layer || rest_settle(sim, request, fill, err));
     if (good)
         take_over(sim, 0, request->birth, fill);
@@ -684,11 +686,10 @@ void rest_cloud_free(RestCloud *cloud) {
     cloud->boundary.fixed = cloud->boundary.moving = (BoundarySet){0};
     boundary_free(&cloud->boundary);
     dfsph_free(&cloud->dfsph);
-    Buffer *buffers[] = {&cloud->tallies, &cloud->marks,    &cloud->clearance, &cloud->laid,
-                         &cloud->source,  &cloud->fate,     &cloud->frozen,    &cloud->held,
-                         &cloud->state,   &cloud->constant, &cloud->walls,     &cloud->sum,
-                         &cloud->density, &cloud->order,    &cloud->whence[0], &cloud->whence[1],
-                         &cloud->speeds};
+    Buffer *buffers[] = {
+        &cloud->tallies, &cloud->marks, &cloud->clearance, &cloud->laid,      &cloud->source, &cloud->fate,
+        &cloud->frozen,  &cloud->held,  &cloud->state,     &cloud->constant,  &cloud->walls,  &cloud->sum,
+        &cloud->density, &cloud->order, &cloud->whence[0], &cloud->whence[1], &cloud->speeds};
     for (size_t b = 0; b < sizeof buffers / sizeof *buffers; b++)
         buffer_free(buffers[b]);
     for (int f = 0; f <= PARTICLE_FIELD_COUNT; f++)

@@ -130,7 +130,7 @@ static bool fill_alone(SkiffSim *sim, Err *err) {
     sim->body_count = 0;
     sim->boundary.moving = (BoundarySet){0};
     sim->params.rest_steps = sim->params.sea_steps;
-    sim->params.rest_settle = REST_SETTLE_ALL;
+    sim->params.rest_settle = SKIFF_REST_SETTLE_ALL;
     const bool good = rest_fill(sim, &request, &sim->fill, err) && keep_fitted(sim, err);
     sim->params = params;
     sim->boundary.moving = moving;
@@ -225,7 +225,7 @@ static bool take_def(SkiffSim *sim, const SkiffDef *def, Err *err) {
 }
 
 bool sea_has_water_edge(const SkiffDef *def) {
-    return def->sea.on && def->params.window_edge == WINDOW_EDGE_WATER &&
+    return def->sea.on && def->params.window_edge == SKIFF_WINDOW_EDGE_WATER &&
            (def->sea.follow != NULL || def->sea.path_count > 0);
 }
 

@@ -6,9 +6,6 @@
 #include "ghosts.h"
 #include "water.h"
 
-/* Values of the param window_edge. */
-enum { WINDOW_EDGE_WALLS, WINDOW_EDGE_WATER };
-
 typedef struct Sea {
     bool on, absorbs;
     bool water_edge;   /* no walls: water stands still around the window */

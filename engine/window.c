@@ -124,7 +124,7 @@ static bool fill_ring(SkiffSim *sim, const WindowPlace *place, Err *err) {
     memcpy(request.bounds.min, sim->tank.min, sizeof request.bounds.min);
     memcpy(request.bounds.max, sim->tank.max, sizeof request.bounds.max);
     const SkiffParams params = sim->params;
-    sim->params.rest_settle = REST_SETTLE_CANDIDATES;
+    sim->params.rest_settle = SKIFF_REST_SETTLE_CANDIDATES;
     sim->params.rest_steps = sim->params.rest_min_steps = params.window_steps;
     sim->params.rest_target = params.window_target;
     sim->params.rest_time_scale = 1.0f;

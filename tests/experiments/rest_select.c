@@ -76,7 +76,7 @@ static Selection select_at_walls(const Experiment *experiment, int rule, float p
     SkiffDef def = box_def(experiment);
     def.params.rest_steps = def.params.rest_final_steps = 0;
     def.params.rest_rule = rule;
-    if (rule == REST_RULE_BASE)
+    if (rule == SKIFF_REST_RULE_BASE)
         def.params.rest_step = parameter;
     else
         def.params.rest_ratio = parameter;
@@ -136,8 +136,8 @@ static void judge_rules(Experiment *experiment) {
     double growth[2] = {0}; /* of the spread from R 1 to 2.5: with protection, without */
     char what[96];
     for (int k = 0; k < 5; k++) {
-        const Selection alone = select_at_walls(experiment, REST_RULE_REGULATOR, ratios[k]);
-        const Selection both = select_at_walls(experiment, REST_RULE_PROTECTION, ratios[k]);
+        const Selection alone = select_at_walls(experiment, SKIFF_REST_RULE_REGULATOR, ratios[k]);
+        const Selection both = select_at_walls(experiment, SKIFF_REST_RULE_PROTECTION, ratios[k]);
         snprintf(what, sizeof what, "R %g, regulator: distance from target", (double)ratios[k]);
         experiment_note(experiment, what, 100.0 * alone.miss, "%");
         snprintf(what, sizeof what, "R %g, with protection: distance from target", (double)ratios[k]);
@@ -153,7 +153,7 @@ static void judge_rules(Experiment *experiment) {
     }
     experiment_limit(experiment, "spread, change from R 1 to 2.5 with protection", growth[0], growth[1], "%");
     for (int k = 0; k < 3; k++) {
-        const Selection base = select_at_walls(experiment, REST_RULE_BASE, steps[k]);
+        const Selection base = select_at_walls(experiment, SKIFF_REST_RULE_BASE, steps[k]);
         snprintf(what, sizeof what, "base, step %g: distance from target", 1000.0 * (double)steps[k]);
         if (k == 0) {
             experiment_limit(experiment, what, 100.0 * base.miss, 0.2, "%");
@@ -174,7 +174,7 @@ int main(int argc, char **argv) {
         snprintf(what, sizeof what, "density of a flat wall at %d r", k);
         experiment_check(&experiment, what, wall_density(&experiment, k), expected[k], 0.03, "density0");
     }
-    const Selection walls = select_at_walls(&experiment, REST_RULE_PROTECTION, 2.0f);
+    const Selection walls = select_at_walls(&experiment, SKIFF_REST_RULE_PROTECTION, 2.0f);
     experiment_check(&experiment, "mean density of the candidates, R 2", walls.mean, 0.999, 0.002 * 0.999,
                      "density0");
     experiment_check(&experiment, "passes, median", walls.median_passes, 6, 2, "");

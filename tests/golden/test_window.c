@@ -74,7 +74,7 @@ static SkiffSim *make_sea(int threads, SkiffSimd simd, double start, bool has_fi
 }
 
 static SkiffSim *make(int threads, SkiffSimd simd, double start) {
-    return make_sea(threads, simd, start, false, WINDOW_EDGE_WATER);
+    return make_sea(threads, simd, start, false, SKIFF_WINDOW_EDGE_WATER);
 }
 
 static void run(SkiffSim *sim, int steps) {
@@ -97,11 +97,11 @@ static uint64_t hash_of(int threads, SkiffSimd simd, int edge) {
 
 static void test_threads_and_instruction_sets(void **state) {
     (void)state;
-    const uint64_t expected = hash_of(1, SKIFF_SIMD_PLAIN, WINDOW_EDGE_WATER);
+    const uint64_t expected = hash_of(1, SKIFF_SIMD_PLAIN, SKIFF_WINDOW_EDGE_WATER);
     for (int threads = 2; threads <= 3; threads++)
-        assert_int_equal(hash_of(threads, SKIFF_SIMD_AUTO, WINDOW_EDGE_WATER), expected);
-    assert_int_equal(hash_of(3, SKIFF_SIMD_AUTO, WINDOW_EDGE_WALLS),
-                     hash_of(1, SKIFF_SIMD_PLAIN, WINDOW_EDGE_WALLS));
+        assert_int_equal(hash_of(threads, SKIFF_SIMD_AUTO, SKIFF_WINDOW_EDGE_WATER), expected);
+    assert_int_equal(hash_of(3, SKIFF_SIMD_AUTO, SKIFF_WINDOW_EDGE_WALLS),
+                     hash_of(1, SKIFF_SIMD_PLAIN, SKIFF_WINDOW_EDGE_WALLS));
 }
 
 static void test_save_and_resume(void **state) {
@@ -165,7 +165,7 @@ static void test_far_away(void **state) {
  * and leaves behind, one is so far that cells over both would not fit into memory. */
 static void test_fixed_bodies(void **state) {
     (void)state;
-    SkiffSim *sim = make_sea(2, SKIFF_SIMD_AUTO, 0.0, true, WINDOW_EDGE_WATER);
+    SkiffSim *sim = make_sea(2, SKIFF_SIMD_AUTO, 0.0, true, SKIFF_WINDOW_EDGE_WATER);
     const SkiffBody pillar = skiff_body(sim, 1);
     double deepest = -INFINITY, force = 0.0;
     for (int k = 0; k < 3 * STEPS; k++) {

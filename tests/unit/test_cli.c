@@ -143,6 +143,8 @@ static void usage_mistakes_exit_with_2(void **state) {
          "skiff reproduce carensac2023: --runs: expected an integer from 1 to 10000, found \"0\"\n"},
         {"reproduce carensac2023 --radius 1",
          "skiff reproduce carensac2023: --radius: expected a number from 0.0125 to 0.1, found \"1\"\n"},
+        {"reproduce carensac2023 fig4c -o .",
+         "skiff reproduce carensac2023: .: the folder exists; --force replaces its results\n"},
         {"rest make tile", "skiff rest make: takes options only, \"tile\" is given\n"},
         {"rest make --edge 5", "skiff rest make: --edge: expected a number from 6 to 64, found \"5\"\n"},
         {"rest cut -o block.skiff", "skiff rest cut: the folder is missing\n"},

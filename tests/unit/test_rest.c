@@ -121,13 +121,13 @@ static void rules_are_ordered_as_in_the_paper(void **state) {
     Scene scene;
     scene_make(&scene);
     int few, many, unused;
-    const double large = miss(&scene, REST_RULE_BASE, 0.06f, 2.0f, &unused);
-    const double small = miss(&scene, REST_RULE_BASE, 0.005f, 2.0f, &many);
-    const double regulated = miss(&scene, REST_RULE_REGULATOR, 0.06f, 2.0f, &few);
+    const double large = miss(&scene, SKIFF_REST_RULE_BASE, 0.06f, 2.0f, &unused);
+    const double small = miss(&scene, SKIFF_REST_RULE_BASE, 0.005f, 2.0f, &many);
+    const double regulated = miss(&scene, SKIFF_REST_RULE_REGULATOR, 0.06f, 2.0f, &few);
     assert_true(large > 0.008 && small < 0.002 && regulated < 0.002);
     assert_true(many > 4 * few);
-    const double alone = miss(&scene, REST_RULE_REGULATOR, 0.06f, 4.0f, &unused);
-    const double protected = miss(&scene, REST_RULE_PROTECTION, 0.06f, 4.0f, &unused);
+    const double alone = miss(&scene, SKIFF_REST_RULE_REGULATOR, 0.06f, 4.0f, &unused);
+    const double protected = miss(&scene, SKIFF_REST_RULE_PROTECTION, 0.06f, 4.0f, &unused);
     assert_true(protected < 0.8 * alone);
 }
 
@@ -161,13 +161,13 @@ static void check_existing(const Motion *before, const Motion *after, uint64_t e
         if (memcmp(a, b, sizeof after[id].position) == 0)
             continue;
         moved++;
-        assert_int_equal(settle, REST_SETTLE_SHELL);
+        assert_int_equal(settle, SKIFF_REST_SETTLE_SHELL);
         /* the cut is at x = -0.2 above y = 0.15 */
         assert_true(a[0] > -0.2f - 9.0f * r && (a[0] < -0.2f + 5.0f * r || a[1] < 0.15f + 5.0f * r));
         for (int k = 0; k < 3; k++)
             assert_true(fabsf(b[k] - a[k]) < r);
     }
-    assert_true((moved > 0) == (settle == REST_SETTLE_SHELL));
+    assert_true((moved > 0) == (settle == SKIFF_REST_SETTLE_SHELL));
 }
 
 static float nearest_pair(const SkiffSim *sim) {
@@ -214,7 +214,7 @@ static void refill(SkiffSim *sim, int settle) {
     assert_int_equal(particles.count, kept + fill->particles);
     /* at a cut through water the selection takes some more than it leaves gaps: 2 % of so small a block */
     assert_true(fabs((double)fill->particles / removed - 1.0) < 0.03);
-    assert_true((fill->active == fill->particles) == (settle != REST_SETTLE_CANDIDATES));
+    assert_true((fill->active == fill->particles) == (settle != SKIFF_REST_SETTLE_CANDIDATES));
     uint32_t moving = 0;
     for (uint32_t i = 0; i < particles.count; i++) {
         const bool fresh = particles.id[i] >= end;
@@ -224,13 +224,13 @@ static void refill(SkiffSim *sim, int settle) {
     }
     assert_int_equal(moving, fill->particles);
     if (settle !=
-        REST_SETTLE_CANDIDATES) /* a layer between walls and water that cannot yield may end closer */
+        SKIFF_REST_SETTLE_CANDIDATES) /* a layer between walls and water that cannot yield may end closer */
         assert_true(nearest_pair(sim) > 0.5f * 0.025f);
 }
 
 static void removed_water_is_replaced(void **state) {
     (void)state;
-    for (int settle = REST_SETTLE_ALL; settle <= REST_SETTLE_SHELL; settle++) {
+    for (int settle = SKIFF_REST_SETTLE_ALL; settle <= SKIFF_REST_SETTLE_SHELL; settle++) {
         Scene scene;
         scene_make(&scene);
         scene.def.params.rest_settle = settle;
@@ -266,7 +266,7 @@ static void two_fluids_fit_better_than_fluid_and_wall(void **state) {
 
 static void a_failed_fill_leaves_no_trace(void **state) {
     (void)state;
-    for (int settle = REST_SETTLE_ALL; settle <= REST_SETTLE_SHELL; settle++) {
+    for (int settle = SKIFF_REST_SETTLE_ALL; settle <= SKIFF_REST_SETTLE_SHELL; settle++) {
         Scene scene;
         scene_make(&scene);
         scene.def.params.rest_settle = settle;
@@ -346,7 +346,7 @@ static uint64_t filled_hash(const Scene *scene) {
 
 static void threads_and_instruction_sets_give_the_same_bits(void **state) {
     (void)state;
-    for (int settle = REST_SETTLE_ALL; settle <= REST_SETTLE_SHELL; settle++) {
+    for (int settle = SKIFF_REST_SETTLE_ALL; settle <= SKIFF_REST_SETTLE_SHELL; settle++) {
         Scene scene;
         scene_make(&scene);
         scene.def.body_count = 1;

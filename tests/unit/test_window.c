@@ -114,7 +114,7 @@ static void test_every_shape(void **state) {
 /* Both kinds of edge, the paper's walls and water, keep an old particle where it is in the world. */
 static void test_particles_stay(void **state) {
     (void)state;
-    for (int edge = WINDOW_EDGE_WALLS; edge <= WINDOW_EDGE_WATER; edge++) {
+    for (int edge = SKIFF_WINDOW_EDGE_WALLS; edge <= SKIFF_WINDOW_EDGE_WATER; edge++) {
         Scene scene;
         scene_make(&scene);
         scene.def.params.window_edge = edge;
