@@ -156,7 +156,7 @@ static float speed_of(const Particles *particles, uint32_t i) {
     return sqrtf(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
-/* The speeds with which a step begins; zeros when nobody asks whose grow. */
+/* The speeds with which a step begins, where it is asked whose grow. */
 static void note_speeds(const Settle *settle) {
     if (settle->patience == 0)
         return;
