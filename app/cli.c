@@ -9,6 +9,8 @@
 #include "view_options.h"
 #include "version.h"
 
+#include "engine/base/file.h"
+
 #include <errno.h>
 #include <math.h>
 #include <stddef.h>
@@ -724,6 +726,11 @@ static int run_group(int count, char **words) {
     }
     fprintf(stderr, "skiff %s: a command is missing\nTry 'skiff %s --help'.\n", words[0], words[0]);
     return ERR_USAGE;
+}
+
+bool cli_check_folder(const CliArgs *args, const char *folder, Err *err) {
+    return args->force || !file_exists(folder) ||
+           err_set(err, ERR_USAGE, "%s: the folder exists; --force replaces its results", folder);
 }
 
 int cli_main(int argc, char **argv) {

@@ -42,6 +42,9 @@ typedef struct CliArgs {
     bool help;
 } CliArgs;
 
+/* Results never replace others unasked: ERR_USAGE when `folder` exists, but for --force. */
+bool cli_check_folder(const CliArgs *args, const char *folder, Err *err);
+
 /* Runs the program. Returns its exit code. */
 int cli_main(int argc, char **argv);
 

@@ -53,8 +53,8 @@ static bool check_args(Redraw *redraw, Err *err) {
     else
         snprintf(redraw->output, sizeof redraw->output, "%.4000s/%s", args->operand,
                  exports(args) ? "export" : "redrawn");
-    if (!args->force && file_exists(redraw->output))
-        return err_set(err, ERR_USAGE, "%s: the folder exists; --force replaces its results", redraw->output);
+    if (!cli_check_folder(args, redraw->output, err))
+        return false;
     redraw->last = frames_last(args->operand, "particles", "skiff");
     if (redraw->last == 0)
         return err_set(err, ERR_INPUT,

@@ -499,11 +499,8 @@ static bool choose(Reproduction *run, Err *err) {
 /* The results' folder, or without one a temporary folder for the set-ups' meshes. */
 static bool prepare_folder(Reproduction *run, Err *err) {
     if (run->args->output) {
-        if (!run->args->force && file_exists(run->args->output))
-            return err_set(err, ERR_USAGE, "%s: the folder exists; --force replaces its results",
-                           run->args->output);
         snprintf(run->folder, sizeof run->folder, "%s", run->args->output);
-        return file_make_directory(run->folder, err);
+        return cli_check_folder(run->args, run->folder, err) && file_make_directory(run->folder, err);
     }
     const char *temporary = getenv("TMPDIR");
     snprintf(run->folder, sizeof run->folder, "%.4000s/skiff-XXXXXX", temporary ? temporary : "/tmp");
