@@ -6,20 +6,29 @@
 #include <stdio.h>
 #include <string.h>
 
+/* The value of a line "key : value" of /proc/cpuinfo; NULL for another key. */
+static const char *cpu_value(const char *line, const char *key) {
+    const size_t length = strlen(key);
+    const char *colon = strchr(line, ':');
+    if (!colon || strncmp(line, key, length) != 0 || line[length + strspn(line + length, " \t")] != ':')
+        return NULL;
+    return colon + 1 + strspn(colon + 1, " \t");
+}
+
+/* A hypervisor gives processors of several generations the same name; their number tells them apart. */
 static void read_cpu_name(char *out, size_t size) {
-    snprintf(out, size, "unknown");
     FILE *file = fopen("/proc/cpuinfo", "r");
-    char line[512];
-    while (file && fgets(line, sizeof line, file)) {
-        const char *colon = strchr(line, ':');
-        if (!colon || (strncmp(line, "model name", 10) != 0 && strncmp(line, "Model", 5) != 0))
-            continue;
-        const char *name = colon + 1 + strspn(colon + 1, " \t");
-        snprintf(out, size, "%.*s", (int)strcspn(name, "\n"), name);
-        break;
+    char line[512], name[96] = "unknown", model[16] = "";
+    while (file && fgets(line, sizeof line, file) && strcmp(line, "\n") != 0) { /* of the first processor */
+        const char *value;
+        if ((value = cpu_value(line, "model name")) != NULL || (value = cpu_value(line, "Model")) != NULL)
+            snprintf(name, sizeof name, "%.*s", (int)strcspn(value, "\n"), value);
+        else if ((value = cpu_value(line, "model")) != NULL)
+            snprintf(model, sizeof model, "%.*s", (int)strcspn(value, "\n"), value);
     }
     if (file)
         fclose(file);
+    snprintf(out, size, *model ? "%s (model %s)" : "%s", name, model);
     for (char *c = out; *c; c++) /* it becomes a CSV cell */
         if (*c == ',' || *c == '"' || *c < ' ')
             *c = ' ';

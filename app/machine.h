@@ -7,7 +7,7 @@
 #include <jansson.h>
 
 typedef struct Machine {
-    char cpu[128];   /* model name */
+    char cpu[128];   /* model name and number, "Intel(R) Xeon(R) Processor (model 106)" */
     int cores;       /* processors that this process may use */
     int threads;     /* that the simulation uses */
     const char *isa; /* that the hot loops use */

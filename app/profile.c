@@ -15,33 +15,16 @@
 
 /* ---- Columns ---- */
 
-typedef enum ColumnId {
-    STEP,
-    TIME,
-    DT,
-    PARTICLES,
-    DENSITY_ITERATIONS,
-    DIVERGENCE_ITERATIONS,
-    MOVED,
-    STEP_MS,
-    COLUMN_COUNT
-} ColumnId;
-
-static const char *const column_names[COLUMN_COUNT] = {
-    [STEP] = "step",
-    [TIME] = "t",
-    [DT] = "dt",
-    [PARTICLES] = "particles",
-    [DENSITY_ITERATIONS] = "density_iterations",
-    [DIVERGENCE_ITERATIONS] = "divergence_iterations",
-    [MOVED] = "moved",
-    [STEP_MS] = "step_ms",
+const char *const profile_columns[PROFILE_COLUMN_COUNT] = {
+#define COLUMN(id, name) name,
+    PROFILE_COLUMNS(COLUMN)
+#undef COLUMN
 };
 
 /* A table with the places of its columns. */
 typedef struct Source {
     const CsvTable *table;
-    int columns[COLUMN_COUNT];
+    int columns[PROFILE_COLUMN_COUNT];
     int phases[PROFILE_MAX_PHASES];
     uint8_t *age;  /* [rows] steps since the last move: 0 for the move itself, 255 long ago */
     double *spare; /* [rows] */
@@ -52,14 +35,14 @@ static double cell(const Source *source, size_t row, int column) {
     return source->table->values[row * (size_t)source->table->column_count + (size_t)column];
 }
 
-static double value_at(const Source *source, size_t row, ColumnId column) {
+static double value_at(const Source *source, size_t row, ProfileColumn column) {
     return cell(source, row, source->columns[column]);
 }
 
 bool profile_phase_key(const char *column, char *key, size_t size) {
     const size_t length = strlen(column);
     if (length <= 3 || length >= size || strcmp(column + length - 3, "_ms") != 0 ||
-        strcmp(column, column_names[STEP_MS]) == 0)
+        strcmp(column, profile_columns[PROFILE_STEP_MS]) == 0)
         return false;
     memcpy(key, column, length - 3);
     key[length - 3] = '\0';
@@ -68,10 +51,10 @@ bool profile_phase_key(const char *column, char *key, size_t size) {
 
 static bool find_columns(Source *source, const char *name, Profile *profile, Err *err) {
     const CsvTable *table = source->table;
-    for (int c = 0; c < COLUMN_COUNT; c++) {
-        source->columns[c] = csv_column(table, column_names[c]);
+    for (int c = 0; c < PROFILE_COLUMN_COUNT; c++) {
+        source->columns[c] = csv_column(table, profile_columns[c]);
         if (source->columns[c] < 0)
-            return err_set(err, ERR_INPUT, "%s: has no column %s", name, column_names[c]);
+            return err_set(err, ERR_INPUT, "%s: has no column %s", name, profile_columns[c]);
     }
     for (int c = 0; c < table->column_count && profile->phase_count < PROFILE_MAX_PHASES; c++) {
         ProfilePhase *phase = &profile->phases[profile->phase_count];
@@ -118,7 +101,7 @@ static double column_median(Source *source, int column) {
 static void find_moves(Source *source, Profile *profile) {
     unsigned age = UINT8_MAX;
     for (size_t row = 0; row < source->table->row_count; row++) {
-        const bool moved = value_at(source, row, MOVED) > 0;
+        const bool moved = value_at(source, row, PROFILE_MOVED) > 0;
         profile->moves += moved;
         age = moved ? 0 : age < UINT8_MAX ? age + 1 : age;
         source->age[row] = (uint8_t)age;
@@ -127,7 +110,7 @@ static void find_moves(Source *source, Profile *profile) {
 
 static void measure(Source *source, Profile *profile) {
     const size_t count = source->table->row_count;
-    const int step_ms = source->columns[STEP_MS];
+    const int step_ms = source->columns[PROFILE_STEP_MS];
     profile->steps = count;
     profile->mean_ms = group_mean(source, step_ms, ALL);
     profile->plain_ms = group_mean(source, step_ms, PLAIN);
@@ -139,7 +122,7 @@ static void measure(Source *source, Profile *profile) {
     profile->p99_ms = summary_percentile(sorted, count, 99);
     profile->max_ms = sorted[count - 1];
     profile->real_time_factor =
-        summary_real_time_factor(group_mean(source, source->columns[DT], ALL), profile->mean_ms);
+        summary_real_time_factor(group_mean(source, source->columns[PROFILE_DT], ALL), profile->mean_ms);
     for (int p = 0; p < profile->phase_count; p++) {
         ProfilePhase *phase = &profile->phases[p];
         phase->mean_ms = group_mean(source, source->phases[p], ALL);
@@ -148,7 +131,7 @@ static void measure(Source *source, Profile *profile) {
         phase->p50_ms = column_median(source, source->phases[p]);
     }
     for (int k = 0; k < 2; k++)
-        source->p50_iterations[k] = column_median(source, source->columns[DENSITY_ITERATIONS + k]);
+        source->p50_iterations[k] = column_median(source, source->columns[PROFILE_DENSITY_ITERATIONS + k]);
 }
 
 /* ---- Why a step was slow ---- */
@@ -174,13 +157,13 @@ static void explain_work(const Source *source, size_t row, char *why, size_t siz
     else if (source->age[row] <= PROFILE_AFTER)
         add_reason(why, size, "%u after a window move", (unsigned)source->age[row]);
     for (int k = 0; k < 2; k++) {
-        const double iterations = value_at(source, row, DENSITY_ITERATIONS + k);
+        const double iterations = value_at(source, row, PROFILE_DENSITY_ITERATIONS + k);
         if (iterations > 1.2 * source->p50_iterations[k] + 0.5)
             add_reason(why, size, "%.0f %s iterations (median %.0f)", iterations, solves[k],
                        source->p50_iterations[k]);
     }
     const double change =
-        row > 0 ? value_at(source, row, PARTICLES) - value_at(source, row - 1, PARTICLES) : 0;
+        row > 0 ? value_at(source, row, PROFILE_PARTICLES) - value_at(source, row - 1, PROFILE_PARTICLES) : 0;
     if (change > 0)
         add_reason(why, size, "%.0f particles more", change);
 }
@@ -207,9 +190,9 @@ static void find_worst(const Source *source, Profile *profile) {
     const size_t count = source->table->row_count;
     size_t rows[PROFILE_WORST];
     for (size_t row = 0; row < count; row++) {
-        const double ms = value_at(source, row, STEP_MS);
+        const double ms = value_at(source, row, PROFILE_STEP_MS);
         int place = profile->worst_count;
-        while (place > 0 && value_at(source, rows[place - 1], STEP_MS) < ms)
+        while (place > 0 && value_at(source, rows[place - 1], PROFILE_STEP_MS) < ms)
             place--;
         if (place == PROFILE_WORST)
             continue;
@@ -220,9 +203,9 @@ static void find_worst(const Source *source, Profile *profile) {
     }
     for (int k = 0; k < profile->worst_count; k++) {
         ProfileStep *step = &profile->worst[k];
-        *step = (ProfileStep){.step = value_at(source, rows[k], STEP),
-                              .t = value_at(source, rows[k], TIME),
-                              .ms = value_at(source, rows[k], STEP_MS),
+        *step = (ProfileStep){.step = value_at(source, rows[k], PROFILE_STEP),
+                              .t = value_at(source, rows[k], PROFILE_TIME),
+                              .ms = value_at(source, rows[k], PROFILE_STEP_MS),
                               .moved = source->age[rows[k]] == 0};
         explain(source, profile, rows[k], step);
     }

@@ -9,6 +9,26 @@
 
 enum { PROFILE_WORST = 10, PROFILE_AFTER = 5, PROFILE_MAX_PHASES = 64 };
 
+/* What a table of steps must have to be profiled: constant, name of the column. Phases come on top. */
+#define PROFILE_COLUMNS(COLUMN)                                                                              \
+    COLUMN(STEP, "step")                                                                                     \
+    COLUMN(TIME, "t")                                                                                        \
+    COLUMN(DT, "dt")                                                                                         \
+    COLUMN(PARTICLES, "particles")                                                                           \
+    COLUMN(DENSITY_ITERATIONS, "density_iterations")                                                         \
+    COLUMN(DIVERGENCE_ITERATIONS, "divergence_iterations")                                                   \
+    COLUMN(MOVED, "moved")                                                                                   \
+    COLUMN(STEP_MS, "step_ms")
+
+typedef enum ProfileColumn {
+#define COLUMN(id, name) PROFILE_##id,
+    PROFILE_COLUMNS(COLUMN)
+#undef COLUMN
+        PROFILE_COLUMN_COUNT
+} ProfileColumn;
+
+extern const char *const profile_columns[PROFILE_COLUMN_COUNT];
+
 /* Milliseconds are NaN where there is no such step. */
 typedef struct ProfilePhase {
     char key[64]; /* its column without "_ms" */

@@ -19,27 +19,15 @@ static const char *const scenes[REPRODUCE_BOAT_WINDOWS] = {"boat-cylinder-5m.jso
 static const double standard_duration = 25;
 static const double start_time = 5; /* s, of the thrust */
 
-/* Columns before those of the phases. The first ones are what profile_make() looks for. */
-enum {
-    STEP,
-    TIME,
-    DT,
-    PARTICLES,
-    DENSITY_ITERATIONS,
-    DIVERGENCE_ITERATIONS,
-    MOVED,
-    STEP_MS,
-    SPEED,
-    BOW_UP,
-    FIRST_PHASE
-};
-static const char header[] =
-    "step,t,dt,particles,density_iterations,divergence_iterations,moved,step_ms,speed,"
-    "bow_up_deg";
+/* Columns between those of the profile and those of the phases. */
+enum { SPEED = PROFILE_COLUMN_COUNT, BOW_UP, FIRST_PHASE };
 
 static bool make_series(Series *series, Err *err) {
     char text[4096];
-    size_t length = (size_t)snprintf(text, sizeof text, "%s", header);
+    size_t length = 0;
+    for (int c = 0; c < PROFILE_COLUMN_COUNT; c++)
+        length += (size_t)snprintf(text + length, sizeof text - length, "%s,", profile_columns[c]);
+    length += (size_t)snprintf(text + length, sizeof text - length, "speed,bow_up_deg");
     for (int p = 0; p < SKIFF_PHASE_COUNT; p++)
         length += (size_t)snprintf(text + length, sizeof text - length, ",%s_ms", skiff_phase_key(p));
     return series_make(series, text, err);
@@ -57,14 +45,14 @@ static bool add_row(Series *series, const SkiffSim *sim, Err *err) {
         return false;
     const SkiffStats *stats = skiff_stats(sim);
     const SkiffBody boat = skiff_body(sim, 0);
-    row[STEP] = (double)stats->step;
-    row[TIME] = stats->time;
-    row[DT] = stats->dt;
-    row[PARTICLES] = stats->particles;
-    row[DENSITY_ITERATIONS] = stats->density_iterations;
-    row[DIVERGENCE_ITERATIONS] = stats->divergence_iterations;
-    row[MOVED] = stats->moved;
-    row[STEP_MS] = stats->step_ms;
+    row[PROFILE_STEP] = (double)stats->step;
+    row[PROFILE_TIME] = stats->time;
+    row[PROFILE_DT] = stats->dt;
+    row[PROFILE_PARTICLES] = stats->particles;
+    row[PROFILE_DENSITY_ITERATIONS] = stats->density_iterations;
+    row[PROFILE_DIVERGENCE_ITERATIONS] = stats->divergence_iterations;
+    row[PROFILE_MOVED] = stats->moved;
+    row[PROFILE_STEP_MS] = stats->step_ms;
     row[SPEED] = sqrt(boat.velocity[0] * boat.velocity[0] + boat.velocity[2] * boat.velocity[2]);
     row[BOW_UP] = reproduce_bow_up(&boat);
     for (int p = 0; p < SKIFF_PHASE_COUNT; p++)
@@ -87,9 +75,9 @@ static bool sail(const ReproduceJob *job, int window, SkiffSim *sim, double end,
 /* The rows of the cruise as a table of their own, which shares them. */
 static CsvTable cruise_of(const Series *series) {
     CsvTable table = series->table;
-    const double end = series_at(series, table.row_count - 1, TIME);
+    const double end = series_at(series, table.row_count - 1, PROFILE_TIME);
     const double begin = end > start_time ? 0.5 * (start_time + end) : 0.5 * end;
-    while (table.row_count > 1 && table.values[TIME] < begin) {
+    while (table.row_count > 1 && table.values[PROFILE_TIME] < begin) {
         table.values += table.column_count;
         table.row_count--;
     }
@@ -110,7 +98,7 @@ static bool sum_up(const ReproduceJob *job, int window, const SkiffSim *sim, con
     bool good = profile || err_set(err, ERR_IO, "out of memory");
     good = good && profile_make(&cruise, scenes[window], profile, err);
     if (good) {
-        values[CARENSAC_BOAT_PARTICLES] = column_mean(&cruise, PARTICLES);
+        values[CARENSAC_BOAT_PARTICLES] = column_mean(&cruise, PROFILE_PARTICLES);
         values[CARENSAC_BOAT_SAMPLES] = skiff_stats(sim)->boundary_samples;
         values[CARENSAC_BOAT_STEP] = profile->plain_ms;
         values[CARENSAC_BOAT_ABSORB] = profile->phases[SKIFF_PHASE_ABSORB].plain_ms;
@@ -155,7 +143,7 @@ static void write_windows(FILE *out, const Sheet *sheet, const Series *series, c
     bool good = true;
     for (int w = 0; w < REPRODUCE_BOAT_WINDOWS; w++) {
         const CsvTable *table = &series[w].table;
-        copies[2 * w] = csv_copy_column(table, table->names[TIME]);
+        copies[2 * w] = csv_copy_column(table, table->names[PROFILE_TIME]);
         copies[2 * w + 1] = csv_copy_column(table, table->names[column]);
         good = good && copies[2 * w] && copies[2 * w + 1];
         curves[w] = (SvgCurve){sheet->rows[w].name, copies[2 * w], copies[2 * w + 1], table->row_count};
@@ -183,9 +171,9 @@ static void write_after_moves(FILE *out, const Sheet *sheet, const Series *serie
         int steps = AGES;
         for (size_t row = 0; row < cruise.row_count; row++) {
             const double *cells = cruise.values + row * (size_t)cruise.column_count;
-            steps = cells[MOVED] > 0 ? 0 : steps + 1;
+            steps = cells[PROFILE_MOVED] > 0 ? 0 : steps + 1;
             if (steps < AGES) {
-                sum[steps] += cells[STEP_MS];
+                sum[steps] += cells[PROFILE_STEP_MS];
                 count[steps]++;
             }
         }
@@ -205,9 +193,10 @@ void reproduce_boat_charts(FILE *out, const Sheet *sheet, const Series series[RE
     } charts[] = {
         {{.title = "Speed of the boat", .y_label = "speed, m/s", .from_zero = true}, SPEED},
         {{.title = "Trim", .y_label = "bow up, degrees"}, BOW_UP},
-        {{.title = "Particles", .y_label = "particles", .from_zero = true}, PARTICLES},
-        {{.title = "Time of a step", .y_label = "ms", .from_zero = true}, STEP_MS},
-        {{.title = "Density iterations", .y_label = "iterations", .from_zero = true}, DENSITY_ITERATIONS},
+        {{.title = "Particles", .y_label = "particles", .from_zero = true}, PROFILE_PARTICLES},
+        {{.title = "Time of a step", .y_label = "ms", .from_zero = true}, PROFILE_STEP_MS},
+        {{.title = "Density iterations", .y_label = "iterations", .from_zero = true},
+         PROFILE_DENSITY_ITERATIONS},
     };
     fputs("<div class=\"charts\">\n", out);
     for (size_t k = 0; k < sizeof charts / sizeof *charts; k++) {
