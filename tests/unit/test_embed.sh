@@ -30,11 +30,11 @@ $2
 add_executable(crate $work/crate.c)
 target_link_libraries(crate PRIVATE skiff::skiff)
 EOF
-    cmake -S "$work/$1" -B "$work/$1/build" -DCMAKE_C_COMPILER="$cc" -DCMAKE_PREFIX_PATH="$work/prefix" >"$work/log" &&
-        cmake --build "$work/$1/build" --target crate --parallel 2 >>"$work/log" || {
+    if ! { cmake -S "$work/$1" -B "$work/$1/build" -DCMAKE_C_COMPILER="$cc" -DCMAKE_PREFIX_PATH="$work/prefix" &&
+        cmake --build "$work/$1/build" --target crate --parallel 2; } >"$work/log"; then
         cat "$work/log"
         fail "$1 does not build"
-    }
+    fi
 }
 
 awk '/^    #include <skiff.h>/ { on = 1 } on && /^[^ ]/ { exit } on { print substr($0, 5) }' "$source/README.md" >"$work/crate.c"
