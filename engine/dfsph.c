@@ -59,14 +59,13 @@ static const double STEADY_SAFETY = 0.4;
 
 bool dfsph_reserve(Dfsph *dfsph, uint32_t particle_capacity, uint32_t object_count, Err *err) {
     const size_t padded = particle_capacity + BLOCK, blocks = padded / BLOCK;
-    const size_t bytes = padded * (4 * sizeof(Float4) + 7 * sizeof(float)) +
+    const size_t bytes = padded * (3 * sizeof(Float4) + 7 * sizeof(float)) +
                          blocks * (DFSPH_SUMS * sizeof(double) + 1) +
                          (size_t)object_count * 2 * sizeof *dfsph->response;
     if (!buffer_reserve(&dfsph->buffer, "pressure solver", bytes, err))
         return false;
     char *next = dfsph->buffer.data;
 #define TAKE(field, count) (dfsph->field = (void *)next, next += (count) * sizeof *dfsph->field)
-    TAKE(operand, padded);
     TAKE(guess, padded);
     TAKE(answer, padded);
     TAKE(spare, padded);
@@ -451,7 +450,6 @@ static void prepare(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kind, f
         /* other arrays may have lain here */
         memset(dfsph->direction + begin, 0, BLOCK * sizeof(float));
         memset(dfsph->image + begin, 0, BLOCK * sizeof(float));
-        memcpy(dfsph->operand + begin, problem->particles->position + begin, BLOCK * sizeof(Float4));
         if (dfsph->base == dfsph->spare)
             push_block(dfsph, problem, block);
         if (dfsph->shifting)
@@ -661,6 +659,7 @@ SolveResult dfsph_solve(Dfsph *dfsph, const DfsphProblem *problem, SolveKind kin
         return (SolveResult){0};
     const bool first = kind == SOLVE_DENSITY || kind == SOLVE_FLOW;
     float *p = first ? problem->particles->pressure : problem->particles->pressure_divergence;
+    dfsph->operand = problem->particles->position;
     dfsph->pairs = kind == SOLVE_FLOW ? &problem->rows->corrected : &problem->rows->pairs;
     dfsph->moving = problem->body_count > 0 && problem->boundary->moving.samples.count != 0;
     dfsph->answering = kind != SOLVE_SHIFT;

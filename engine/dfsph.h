@@ -21,7 +21,7 @@ typedef struct SolveResult {
 } SolveResult;
 
 typedef struct Dfsph {
-    Float4 *operand;       /* positions, and what D^T is applied to in the fourth place */
+    Float4 *operand;       /* the particles' positions, and what D^T is applied to in the fourth place */
     Float4 *guess;         /* velocity after the pressure evaluated last */
     Float4 *answer;        /* D^T z */
     Float4 *spare;         /* for others between the solves, as are the two above; in them see base */

@@ -1,6 +1,6 @@
 /* What a fluid particle carries from step to step, once: the sort permutes it, states save it, the hash covers it.
  * PARTICLE_FIELD(field, scalar type, scalars, state type) */
-PARTICLE_FIELD(position, float, 4, STATE_F32)            /* m, window-local; [3] unused, 0 */
+PARTICLE_FIELD(position, float, 4, STATE_F32)            /* m, window-local; [3] left over from the solves, not read */
 PARTICLE_FIELD(velocity, float, 4, STATE_F32)            /* m/s; [3] left over from the solves, not read */
 PARTICLE_FIELD(pressure, float, 1, STATE_F32)            /* p dt^2 / rho0 of the density solve, m^2: its warm start */
 PARTICLE_FIELD(pressure_divergence, float, 1, STATE_F32) /* the same of the divergence solve */
