@@ -1,6 +1,6 @@
-/* Counting sort of the particles by cell, and of groups of them by the size of their rows. Each thread counts
- * and later moves one contiguous part of the particles, and the parts are taken in order within a cell, so
- * the sort is stable and its result does not depend on the number of threads. */
+/* Counting sort of the particles by cell, and of groups of them by who moves and by the size of their rows.
+ * Each thread counts and later moves one contiguous part of the particles, and the parts are taken in order
+ * within a cell, so the sort is stable and its result does not depend on the number of threads. */
 #include "grid.h"
 
 #include <assert.h>
@@ -64,7 +64,8 @@ static bool grid_reserve(Grid *grid, const Particles *particles, size_t cells, i
         !buffer_reserve(&grid->unsorted_buffer, "cells before the sort", padded * sizeof(uint32_t), err) ||
         !buffer_reserve(&grid->member_buffer, "particles by cell", padded * sizeof(uint32_t), err) ||
         !buffer_reserve(&grid->point_buffer, "positions by cell", 3 * padded * sizeof(float), err) ||
-        !buffer_reserve(&grid->order_buffer, "sort order", padded * sizeof(uint32_t), err))
+        !buffer_reserve(&grid->order_buffer, "sort order", padded * sizeof(uint32_t), err) ||
+        !buffer_reserve(&grid->visit_buffer, "order of the search", padded * sizeof(uint32_t), err))
         return false;
     grid->cell = grid->cell_buffer.data;
     grid->member = grid->member_buffer.data;
@@ -72,6 +73,7 @@ static bool grid_reserve(Grid *grid, const Particles *particles, size_t cells, i
     grid->y = grid->x + padded;
     grid->z = grid->y + padded;
     grid->order = grid->order_buffer.data;
+    grid->visits = grid->visit_buffer.data;
     grid->cells.start = grid->start_buffer.data;
     return true;
 }
@@ -81,8 +83,7 @@ static bool grid_reserve(Grid *grid, const Particles *particles, size_t cells, i
 static void counting_sort(Grid *grid, const Particles *particles, const CellBounds *domain, bool check,
                           int parts) {
     const CellGrid *cells = &grid->cells;
-    const uint32_t slab = (uint32_t)(cells->size[1] * cells->size[2]), slabs = (uint32_t)grid_parts(grid);
-    const uint32_t cell_count = (uint32_t)cells->size[0] * slabs * slab;
+    const uint32_t cell_count = (uint32_t)cell_grid_count(cells);
     uint32_t *unsorted = grid->unsorted_buffer.data, *histograms = grid->histogram_buffer.data;
     uint32_t *start = grid->start_buffer.data;
     const uint32_t n = particles->count;
@@ -96,8 +97,6 @@ static void counting_sort(Grid *grid, const Particles *particles, const CellBoun
             for (uint32_t i = (uint32_t)((uint64_t)n * part / parts); i < end; i++) {
                 const float *p = particles->position[i];
                 unsorted[i] = check && !inside(p, domain) ? cell_count : cell_grid_at(cells, p);
-                if (grid->apart != NULL && unsorted[i] < cell_count)
-                    unsorted[i] += (unsorted[i] / slab + grid->apart[i]) * slab;
                 histogram[unsorted[i]]++;
             }
         }
@@ -134,24 +133,43 @@ static inline int32_t row_key(uint32_t row_size, uint32_t place) {
     return (int32_t)((row_all(row_size) << 9 | row_near(row_size)) * ROW_GROUP + place);
 }
 
-/* Fills order, and turns member from where the particles are to where they will be. A particle's rank in its
- * group is the number of those before it: few enough to compare all with all. */
-static void arrange_groups(Grid *grid, const Particles *particles, uint32_t kept, int threads) {
-#pragma omp parallel for schedule(static) num_threads(threads)
-    for (uint32_t begin = 0; begin < kept; begin += ROW_GROUP) {
-        const uint32_t count = kept - begin < ROW_GROUP ? kept - begin : ROW_GROUP;
-        uint32_t *member = grid->member + begin;
-        int32_t key[ROW_GROUP];
-        for (uint32_t k = 0; k < ROW_GROUP; k++)
-            key[k] = k < count ? row_key(particles->row_size[member[k]], k) : INT32_MAX;
-        for (uint32_t k = 0; k < count; k++) {
-            int32_t rank = 0;
+/* Fills visits of a block. */
+static void part_block(Grid *grid, uint32_t begin, uint32_t end) {
+    uint32_t first = begin, last_count = 0, last[BLOCK];
+    for (uint32_t k = begin; k < end; k++) {
+        if (grid->apart != NULL && grid->apart[grid->member[k]])
+            last[last_count++] = k;
+        else
+            grid->visits[first++] = k;
+    }
+    memcpy(grid->visits + first, last, last_count * sizeof *last);
+}
+
+/* Fills order of a group, and turns member from where its particles are to where they will be. A particle's
+ * rank in its group is the number of those before it: few enough to compare all with all. */
+static void arrange_group(Grid *grid, const Particles *particles, uint32_t begin, uint32_t count) {
+    const uint32_t *visits = grid->visits + begin;
+    uint32_t *member = grid->member;
+    int32_t key[ROW_GROUP];
+    for (uint32_t k = 0; k < ROW_GROUP; k++)
+        key[k] = k < count ? row_key(particles->row_size[member[visits[k]]], k) : INT32_MAX;
+    for (uint32_t k = 0; k < count; k++) {
+        int32_t rank = 0;
 #pragma omp simd reduction(+ : rank)
-            for (uint32_t other = 0; other < ROW_GROUP; other++)
-                rank += key[other] < key[k];
-            grid->order[begin + (uint32_t)rank] = member[k];
-            member[k] = begin + (uint32_t)rank;
-        }
+        for (uint32_t other = 0; other < ROW_GROUP; other++)
+            rank += key[other] < key[k];
+        grid->order[begin + (uint32_t)rank] = member[visits[k]];
+        member[visits[k]] = begin + (uint32_t)rank;
+    }
+}
+
+static void arrange(Grid *grid, const Particles *particles, uint32_t kept, int threads) {
+#pragma omp parallel for schedule(static) num_threads(threads)
+    for (uint32_t block = 0; block < kept; block += BLOCK) {
+        const uint32_t end = kept - block < BLOCK ? kept : block + BLOCK;
+        part_block(grid, block, end);
+        for (uint32_t begin = block; begin < end; begin += ROW_GROUP)
+            arrange_group(grid, particles, begin, end - begin < ROW_GROUP ? end - begin : ROW_GROUP);
     }
 }
 
@@ -195,17 +213,17 @@ bool grid_sort(Grid *grid, Particles *particles, float cell_size, const CellBoun
     if (!cell_grid_layout(&grid->cells, &bounds, cell_size, 1))
         return err_set(err, ERR_DIVERGED, "the fluid spreads over more than %d cells of %g m",
                        CELL_GRID_MAX_CELLS, (double)cell_size);
-    const size_t cells = (size_t)grid->cells.size[0] * (size_t)grid_parts(grid) *
-                         (size_t)grid->cells.size[1] * (size_t)grid->cells.size[2];
+    const size_t cells = cell_grid_count(&grid->cells);
     const int parts = threads < MAX_PARTS ? threads : MAX_PARTS;
     if (!grid_reserve(grid, particles, cells, parts, err))
         return false;
     counting_sort(grid, particles, domain, outside != 0, parts);
     if (removed != NULL)
         *removed = outside;
-    arrange_groups(grid, particles, particles->count - outside, threads);
+    arrange(grid, particles, particles->count - outside, threads);
     particles_permute(particles, grid->order, particles->count - outside, threads);
     copy_points(grid, particles, threads);
+    grid->apart = NULL;
     return true;
 }
 
@@ -215,6 +233,7 @@ void grid_free(Grid *grid) {
     buffer_free(&grid->member_buffer);
     buffer_free(&grid->point_buffer);
     buffer_free(&grid->order_buffer);
+    buffer_free(&grid->visit_buffer);
     buffer_free(&grid->unsorted_buffer);
     buffer_free(&grid->histogram_buffer);
     *grid = (Grid){0};

@@ -173,9 +173,8 @@ typedef uint32_t RowAllocate(void *rows, int thread, uint32_t entries);
 typedef struct SearchJob {
     const CellGrid *grid;
     /* in the order of cells, see Grid */
-    const uint32_t *cell, *member;
+    const uint32_t *cell, *member, *visits;
     const float *points[3];
-    int parts; /* of a slab of cells, see Grid.apart; rows go to particles of the first */
     const Float4 *position;
     uint32_t count;
     Kernel kernel;

@@ -139,9 +139,7 @@ bool rest_search(SkiffSim *sim, uint32_t evaluated, Err *err) {
     if (!boundary_reserve(&cloud->boundary, cloud->points.capacity, sim->body_count, err))
         return false;
     boundary_place_centres(&cloud->boundary, sim->bodies, sim->body_count, sim->origin);
-    const bool good = settle_rows(&settle, err);
-    cloud->grid.apart = NULL; /* what settles has no part that only stands by */
-    return good;
+    return settle_rows(&settle, err);
 }
 
 /* ---- Steps ---- */

@@ -1,7 +1,7 @@
 /* Who is near whom: the neighbour search and the terms of walls and bodies, compiled once per instruction
  * set.
  *
- * The 27 cells around a particle are nine runs of particles (eighteen where slabs of cells have two parts);
+ * The 27 cells around a particle are nine runs of particles;
  * what is near the cell's own is copied once, and each of these keeps those within a support radius. The
  * lists of a group become the rows of its slices, with densities and sums of gradients on the way. Standing
  * water is found alike, in a grid of its own, and is summed up at once. */
@@ -20,7 +20,6 @@ typedef struct Source {
     const CellGrid *grid;
     const float *points[3];
     const uint32_t *member; /* who they are; NULL: as they stand */
-    int parts;              /* of a slab of cells */
 } Source;
 
 /* How far coordinates are outside [low, high]. */
@@ -68,20 +67,16 @@ static Reach cell_reach(const SearchJob *job, uint32_t cell) {
 
 /* Copies those points of the 27 cells around `cell` that are within reach, run by run, and fills the last
  * lanes with points that are near nothing. Returns how many there are, -1 for too many. */
-static int gather_candidates(const Source *source, int64_t cell, const Reach *reach, Candidates *to) {
-    const CellGrid *grid = source->grid;
-    const int32_t column = grid->size[1], slab = grid->size[1] * grid->size[2];
+static int gather_candidates(const Source *source, int32_t cell, const Reach *reach, Candidates *to) {
     const float *const x = source->points[0], *const y = source->points[1], *const z = source->points[2];
     const int32_t *member = (const int32_t *)source->member;
     int n = 0;
-    for (int run = 0; run < 9 * source->parts; run++) {
-        const int64_t slabs = (run / 3 % 3 - 1) * source->parts + run / 9;
-        const int64_t middle = cell + slabs * slab + (run % 3 - 1) * column;
-        const uint32_t end = grid->start[middle + 2];
-        for (uint32_t j = grid->start[middle - 1]; j < end; j += LANES) {
+    for (int run = 0; run < CELL_RUNS; run++) {
+        const CellRun part = cell_grid_run(source->grid, cell, run);
+        for (uint32_t j = part.begin; j < part.end; j += LANES) {
             const Vf p[3] = {vf_load(x + j), vf_load(y + j), vf_load(z + j)};
             const Vi who = member != NULL ? vi_load(member + j) : vi_add(vi_set((int32_t)j), vi_lane());
-            const Vm mine = (Vm)(within_reach(reach, p[0], p[1], p[2]) & first_lanes(end - j));
+            const Vm mine = (Vm)(within_reach(reach, p[0], p[1], p[2]) & first_lanes(part.end - j));
             if (n > MAX_CANDIDATES - LANES)
                 return -1;
             vf_compress(to->x + n, p[0], mine);
@@ -96,11 +91,10 @@ static int gather_candidates(const Source *source, int64_t cell, const Reach *re
 
 /* A cell of the search in the grid of standing water; both begin on multiples of the same edge. False:
  * outside, or at the rim, whose neighbours are empty. */
-static bool standing_cell(const SearchJob *job, uint32_t index, int64_t *cell) {
+static bool standing_cell(const SearchJob *job, uint32_t index, int32_t *cell) {
     const CellGrid *from = job->grid, *to = &job->standing->grid;
     const int32_t column = (int32_t)index / from->size[1];
-    const int32_t c[3] = {column / from->size[2] / job->parts, (int32_t)index % from->size[1],
-                          column % from->size[2]};
+    const int32_t c[3] = {column / from->size[2], (int32_t)index % from->size[1], column % from->size[2]};
     int32_t moved[3];
     for (int k = 0; k < 3; k++) {
         moved[k] = c[k] + (int32_t)lrintf((from->origin[k] - to->origin[k]) * to->inv_size);
@@ -113,16 +107,15 @@ static bool standing_cell(const SearchJob *job, uint32_t index, int64_t *cell) {
 
 /* Candidates of another cell. */
 static void enter_cell(const SearchJob *job, uint32_t index, SearchCell *cell, Scratch *scratch) {
-    const Source particles = {
-        job->grid, {job->points[0], job->points[1], job->points[2]}, job->member, job->parts};
+    const Source particles = {job->grid, {job->points[0], job->points[1], job->points[2]}, job->member};
     const StandingSet *standing = job->standing;
     const Reach reach = cell_reach(job, index);
-    int64_t there;
+    int32_t there;
     cell->index = index;
-    cell->candidate_count = gather_candidates(&particles, index, &reach, &scratch->candidates);
+    cell->candidate_count = gather_candidates(&particles, (int32_t)index, &reach, &scratch->candidates);
     cell->standing_count = 0;
     if (standing != NULL && standing_cell(job, index, &there)) {
-        const Source source = {&standing->grid, {standing->x, standing->y, standing->z}, NULL, 1};
+        const Source source = {&standing->grid, {standing->x, standing->y, standing->z}, NULL};
         cell->standing_count = gather_candidates(&source, there, &reach, &scratch->standing);
     }
 }
@@ -326,8 +319,8 @@ static bool list_group(const SearchJob *job, uint32_t begin, SearchCell *cell, S
                        uint32_t *fault) {
     const uint32_t end = begin + ROW_GROUP < job->count ? begin + ROW_GROUP : job->count;
     uint32_t used = 0, far_used = 0, standing_used = 0;
-    for (uint32_t k = begin; k < end; k++) {
-        const uint32_t i = job->member[k];
+    for (uint32_t visit = begin; visit < end; visit++) {
+        const uint32_t k = job->visits[visit], i = job->member[k];
         scratch->list_start[i % ROW_GROUP] = used;
         scratch->far_start[i % ROW_GROUP] = far_used;
         scratch->standing_start[i % ROW_GROUP] = standing_used;

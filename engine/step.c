@@ -52,6 +52,8 @@ static bool sort_particles(SkiffSim *sim, Err *err) {
     sim->edge_count = 0;
     for (uint32_t i = 0; sim->sea.water_edge && i < sim->particles.count; i++)
         sim->edge_count += sim->particles.edge[i] != EDGE_NONE;
+    if (sim->edge_count > 0)
+        sim->grid.apart = sim->particles.edge;
     return grid_sort(&sim->grid, &sim->particles, sim->kernel.support, &sim->domain,
                      remove ? &sim->stats.particles_out[SKIFF_OUT_ESCAPED] : NULL, sim->threads, err);
 }

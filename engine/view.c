@@ -137,8 +137,8 @@ uint64_t skiff_memory(const SkiffSim *sim) {
         total += sim->particles.front[f].size + sim->particles.back[f].size;
     const Grid *grid = &sim->grid;
     total += grid->start_buffer.size + grid->cell_buffer.size + grid->member_buffer.size +
-             grid->point_buffer.size + grid->order_buffer.size + grid->unsorted_buffer.size +
-             grid->histogram_buffer.size;
+             grid->point_buffer.size + grid->order_buffer.size + grid->visit_buffer.size +
+             grid->unsorted_buffer.size + grid->histogram_buffer.size;
     const Rows *rows = &sim->rows;
     total += rows->pool.size + rows->weights.size + rows->slices.size + rows->density.size +
              rows->gradient_sum.size + rows->neighbour_counts.size + rows->scratch.size;

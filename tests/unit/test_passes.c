@@ -462,6 +462,43 @@ static void test_sort(void **state) {
     }
 }
 
+/* Who is set apart goes behind the others of its block; the search's order visits groups as they lie. */
+static void test_sort_apart(void **state) {
+    (void)state;
+    enum { POINTS = 3000 };
+    Err err = {0};
+    Particles particles = {0};
+    Grid grid = {0};
+    uint64_t drawn = 0;
+    uint8_t apart[POINTS];
+    assert_true(particles_reserve(&particles, POINTS, &err));
+    for (int i = 0; i < POINTS; i++) {
+        const float p[3] = {(float)random_unit(&drawn), (float)random_unit(&drawn),
+                            (float)random_unit(&drawn)};
+        particles_append(&particles, p, (const float[3]){0}, 0.0);
+        apart[i] = random_unit(&drawn) < 0.3 ? 2 : 0;
+    }
+    const uint64_t first_id = particles.id[0];
+    const CellBounds domain = {{0, 0, 0}, {1, 1, 1}};
+    grid.apart = apart;
+    assert_true(grid_sort(&grid, &particles, 0.1f, &domain, NULL, 3, &err));
+    assert_null(grid.apart);
+    int turns = 0; /* from who is set apart to who is not, in the order of the arrays: once a block, and in
+                    * the group where both meet, which goes by the size of rows */
+    for (uint32_t i = 0; i < POINTS; i++) {
+        const bool behind = apart[particles.id[i] - first_id] != 0;
+        turns += i > 0 && i / BLOCK == (i - 1) / BLOCK && i / ROW_GROUP != (i - 1) / ROW_GROUP && !behind &&
+                 apart[particles.id[i - 1] - first_id] != 0;
+        const uint32_t k = grid.visits[i];
+        assert_int_equal(k / BLOCK, i / BLOCK);
+        assert_int_equal(grid.member[k] / ROW_GROUP, i / ROW_GROUP);
+        assert_true(k == 0 || grid.cell[k] >= grid.cell[k - 1]);
+    }
+    assert_int_equal(turns, 0);
+    particles_free(&particles);
+    grid_free(&grid);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_against_all_pairs),
@@ -472,6 +509,7 @@ int main(void) {
         cmocka_unit_test(test_standing_water),
         cmocka_unit_test(test_margins),
         cmocka_unit_test(test_sort),
+        cmocka_unit_test(test_sort_apart),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
