@@ -207,6 +207,7 @@ static bool take_def(SkiffSim *sim, const SkiffDef *def, Err *err) {
     Sea *sea = &sim->sea;
     sea->on = true;
     sea->absorbs = def->sea.absorb;
+    sea->dry = def->sea.dry;
     sea->water_edge = sea_has_water_edge(def);
     sea->has_region = def->sea.has_region;
     for (int k = 0; k < 3; k++) {

@@ -8,6 +8,7 @@
 
 typedef struct Sea {
     bool on, absorbs;
+    bool dry;          /* to be looked at only */
     bool water_edge;   /* no walls: water stands still around the window */
     double level;      /* y of the still surface, world, m */
     double centre[3];  /* of the walls, window-local, m */

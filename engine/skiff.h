@@ -198,7 +198,7 @@ typedef struct SkiffSeaDef {
     bool has_region; /* absorption only where [min, max] is, m */
     float region_min[3], region_max[3];
     const char *cache; /* folder for water that was made before, or NULL */
-    bool dry;          /* no water, which takes long to make: for who only looks at shapes */
+    bool dry; /* no water, which takes long to make: for who only looks at shapes; neither steps nor loads */
 } SkiffSeaDef;
 
 typedef enum SkiffSimd { SKIFF_SIMD_AUTO, SKIFF_SIMD_PLAIN, SKIFF_SIMD_AVX2, SKIFF_SIMD_AVX512 } SkiffSimd;
@@ -241,8 +241,8 @@ SkiffSim *skiff_create(const SkiffDef *def, Err *err);
 /* NULL is fine. */
 void skiff_destroy(SkiffSim *sim);
 
-/* One step of params.time_step. ERR_DIVERGED (step, particle, value in the message): the state is the one in
- * which the fault was found. */
+/* One step of params.time_step. ERR_USAGE: of a sea made dry. ERR_DIVERGED (step, particle, value in the
+ * message): the state is the one in which the fault was found. */
 bool skiff_step(SkiffSim *sim, Err *err);
 
 /* Fills a block with water at rest now, whatever its `fill`, `time` and `repeat` say. What is there already
@@ -474,7 +474,7 @@ uint64_t skiff_memory(const SkiffSim *sim);
 /* Saves everything that the next steps depend on. ERR_IO: the old file, if any, is intact. */
 bool skiff_save(const SkiffSim *sim, const char *path, Err *err);
 /* Replaces the state of a simulation made from the same def. ERR_INPUT when the file is damaged or belongs to
- * another def; sim is then unchanged. */
+ * another def, ERR_USAGE for a sea made dry; sim is then unchanged. */
 bool skiff_load(SkiffSim *sim, const char *path, Err *err);
 
 /* ---- Water at rest: what shapes are filled from ---- */

@@ -122,6 +122,8 @@ static bool load_fields(SkiffSim *sim, const StateFile *file, const char *path, 
 }
 
 bool skiff_load(SkiffSim *sim, const char *path, Err *err) {
+    if (sim->sea.dry)
+        return err_set(err, ERR_USAGE, "%s: a state cannot be loaded into a sea that was made dry", path);
     StateFile *file = state_file_open(path, STATE_VERSION, err);
     if (file == NULL)
         return false;

@@ -277,6 +277,8 @@ static void begin_stats(SkiffStats *stats) {
     }
 
 bool skiff_step(SkiffSim *sim, Err *err) {
+    if (sim->sea.dry)
+        return err_set(err, ERR_USAGE, "a sea that was made dry cannot be stepped");
     double before = timer_ms();
     const double begin = before;
     bool good = true;

@@ -321,12 +321,39 @@ static void test_refusals(void **state) {
     refuse(&scene.def, "Sea.follow: body 'box' starts outside the window");
 }
 
+/* A sea without water is good for its meshes and for nothing else, and says so. */
+static void test_dry(void **state) {
+    (void)state;
+    Scene scene;
+    scene_make(&scene);
+    scene.def.sea.dry = true;
+    SkiffSim *sim = accept(&scene);
+    Err err = {0};
+    const float(*vertices)[3];
+    const uint32_t(*triangles)[3];
+    uint32_t vertex_count, triangle_count;
+    skiff_tank_mesh(sim, &vertices, &vertex_count, &triangles, &triangle_count);
+    assert_true(triangle_count > 0);
+    assert_int_equal(skiff_particles(sim).count, 0);
+    assert_false(skiff_step(sim, &err));
+    assert_int_equal(err.code, ERR_USAGE);
+    assert_false(skiff_load(sim, "dry.skiff", &err));
+    assert_int_equal(err.code, ERR_USAGE);
+    assert_non_null(strstr(err.message, "dry.skiff"));
+    skiff_destroy(sim);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_still_water),     cmocka_unit_test(test_every_shape),
-        cmocka_unit_test(test_particles_stay),  cmocka_unit_test(test_path_into_an_obstacle),
-        cmocka_unit_test(test_path_that_jumps), cmocka_unit_test(test_body_outruns_the_window),
-        cmocka_unit_test(test_levelling),       cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_dry),
+        cmocka_unit_test(test_still_water),
+        cmocka_unit_test(test_every_shape),
+        cmocka_unit_test(test_particles_stay),
+        cmocka_unit_test(test_path_into_an_obstacle),
+        cmocka_unit_test(test_path_that_jumps),
+        cmocka_unit_test(test_body_outruns_the_window),
+        cmocka_unit_test(test_levelling),
+        cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
