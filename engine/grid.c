@@ -185,8 +185,8 @@ static void copy_points(Grid *grid, const Particles *particles, int threads) {
     }
 }
 
-bool grid_sort(Grid *grid, Particles *particles, float cell_size, const CellBounds *domain, uint32_t *removed,
-               int threads, Err *err) {
+static bool sort(Grid *grid, Particles *particles, float cell_size, const CellBounds *domain,
+                 uint32_t *removed, int threads, Err *err) {
     CellBounds bounds;
     grid_bounds(particles, &bounds, threads);
     if (particles->count == 0)
@@ -223,8 +223,14 @@ bool grid_sort(Grid *grid, Particles *particles, float cell_size, const CellBoun
     arrange(grid, particles, particles->count - outside, threads);
     particles_permute(particles, grid->order, particles->count - outside, threads);
     copy_points(grid, particles, threads);
-    grid->apart = NULL;
     return true;
+}
+
+bool grid_sort(Grid *grid, Particles *particles, float cell_size, const CellBounds *domain, uint32_t *removed,
+               int threads, Err *err) {
+    const bool good = sort(grid, particles, cell_size, domain, removed, threads, err);
+    grid->apart = NULL;
+    return good;
 }
 
 void grid_free(Grid *grid) {
