@@ -18,17 +18,19 @@ static const char *cpu_value(const char *line, const char *key) {
 /* A hypervisor gives processors of several generations the same name; their number tells them apart. */
 static void read_cpu_name(char *out, size_t size) {
     FILE *file = fopen("/proc/cpuinfo", "r");
-    char line[512], name[96] = "unknown", model[16] = "";
-    while (file && fgets(line, sizeof line, file) && strcmp(line, "\n") != 0) { /* of the first processor */
+    char line[512], name[96] = "", model[16] = "";
+    while (file &&
+           fgets(line, sizeof line, file)) { /* the first processor's; ARM names the board after all */
         const char *value;
-        if ((value = cpu_value(line, "model name")) != NULL || (value = cpu_value(line, "Model")) != NULL)
+        if (!*name &&
+            ((value = cpu_value(line, "model name")) != NULL || (value = cpu_value(line, "Model")) != NULL))
             snprintf(name, sizeof name, "%.*s", (int)strcspn(value, "\n"), value);
-        else if ((value = cpu_value(line, "model")) != NULL)
+        else if (!*model && (value = cpu_value(line, "model")) != NULL)
             snprintf(model, sizeof model, "%.*s", (int)strcspn(value, "\n"), value);
     }
     if (file)
         fclose(file);
-    snprintf(out, size, *model ? "%s (model %s)" : "%s", name, model);
+    snprintf(out, size, *model ? "%s (model %s)" : "%s", *name ? name : "unknown", model);
     for (char *c = out; *c; c++) /* it becomes a CSV cell */
         if (*c == ',' || *c == '"' || *c < ' ')
             *c = ' ';
